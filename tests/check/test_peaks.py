@@ -74,6 +74,18 @@ def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
     assert np.all(np.diff(ranked[np.isfinite(ranked)]) <= 0)
 
 
+def test_noise_of_a_sensor_makes_no_peaks(model):
+    run = sea_run(seed=3)
+    run["heave"] = run.heave + 5.0
+    noise = 0.2 * float(run.heave.std())
+    run["heave"] = run.heave + noise * np.random.default_rng(0).standard_normal(3000)
+    run.heave.attrs = {"units": "m", "noise_std": noise}
+    found = check.statistics(model, {"test": run}).sel(state="heave")
+    # 150 waves, of which a band of 0.4 SD hides a few; noise without the band makes a third more.
+    assert found.zero_crossing_period.sel(kind="measured") == pytest.approx(2.0, rel=0.08)
+    assert found["mean"].sel(kind="measured") == pytest.approx(5.0, abs=1e-3)
+
+
 def test_waves_outside_the_training_are_named(model, train):
     runs = {
         "train": train,

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run
 from moored import moored_run
 from records import record
 from seas import Sea
@@ -127,6 +128,28 @@ def test_measured_points_hold_the_truth_in_their_intervals(sea, model):
     assert np.all(sure < 0.02)
     judged = check.validation(model, runs, found)
     assert judged.within.sel(point=judged.kind == "regular").all()
+
+
+def test_measured_phases_count_from_the_waves_where_the_vessel_is():
+    spec = HankelDMDc(2, 4, 0.1, alignment=FOLLOWED, delay_rows="exact")
+    model = spec.fit(drifting_run(), STATES, INPUTS)
+    time, rng = DT * np.arange(1200), np.random.default_rng(0)
+    wave = Sea(np.array([0.7]), np.array([0.02]), np.array([1.0]), DEPTH)
+    vessel = POSITIONS["eta_cog"] + 0.6  # m: half a wave of 3.2 m is 1.6
+    channels = {name: wave.at(time, x) for name, x in POSITIONS.items()}
+    heave = 0.8 * wave.at(time - 0.2, vessel) + 0.4 * wave.at(time - 0.5, vessel)
+    surge = 0.6 + 1e-4 * rng.standard_normal(time.size)
+    drifted = record(DT, {"waves": "regular", "water_depth": DEPTH, "encounter_period": 1.4},
+                     surge=surge, heave=heave, **channels)  # fmt: skip
+    for name, x in POSITIONS.items():
+        drifted[name].attrs["x_position"] = x
+    runs = {"regular": drifted, "sea": drifting_run(1, 6000).assign_attrs(waves="irregular")}
+    found = check.measured_response(model, runs).sel(state="heave")
+    error = np.abs(phasors(found) - answer(found.frequency.values))
+    regular = found.kind.values == "regular"
+    assert error[regular] < 0.01
+    # From the probe this drift of 0.6 m both ways, by up to 100°, leaves half of the answer.
+    assert np.sqrt(np.mean(error[~regular] ** 2)) < 0.1
 
 
 def test_accuracy_of_the_instruments_widens_the_interval(model):

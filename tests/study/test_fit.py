@@ -98,6 +98,33 @@ def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
         fit_campaign(seakeep.read_campaign(halves / "campaign.toml"))
 
 
+@pytest.mark.filterwarnings("ignore:.*is noise")
+@pytest.mark.parametrize(
+    ("stated", "taken"), [("", "fir"), ('kind = "hankel_dmdc"\n', "hankel_dmdc")]
+)
+def test_a_filter_that_errs_less_is_taken_where_the_kind_is_left_open(tmp_path, stated, taken):
+    rng = np.random.default_rng(0)
+    runs = ""
+    for name in "abcd":  # the waves tell all but the noise, which 41 delayed states learn by heart
+        eta, noise = rng.standard_normal((2, 200))
+        heave = np.convolve(eta, [0.0, 1.0, -0.5, 0.3])[:200] + noise
+        table = {"t [s]": np.arange(200) / RATE, "eta [m]": eta, "z [m]": heave}
+        write_csv(tmp_path / f"{name}.csv", table)
+        runs += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "train"\n'
+    model = """state_delays = 40
+input_delays = 3
+ridge = "rollout"
+ridge_scale = "per_snapshot"
+delay_rows = "exact"
+select = { horizon = 5, memory = true }
+"""
+    whole = campaign(tmp_path, stated + model, "[campaign]\nencounter_period = 0.4\n" + runs)
+    fitted = fit_campaign(whole)
+    assert fitted.settings.kind == taken
+    assert "kind = 'fir' errs 0." in fitted.selection
+    assert np.isfinite(fitted.forecast(whole.prepare()["a"], 5.0, 20)["heave"]).all()
+
+
 WINDOWED = """
 kind = "bayesian_hankel_dmdc"
 n_members = 4

@@ -10,6 +10,7 @@ from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     HERTZ,
     driven,
+    gathered,
     is_regular,
     read_off,
     reference_probe,
@@ -168,22 +169,28 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
             "no run in use is a free decay in still water. State waves = 'still' and role = 'test' "
             "of such runs (unused ones are not read), and the model's decay stands beside theirs."
         )
-    parts = []
-    for name, run in still.items():
+    spread = model.signature.state_scale.spread[[*map(model.states.index, motions)]]
+
+    def released(name: str) -> xr.Dataset:
+        run = still[name]
         values = channel_matrix(run, motions, name)
         values = values[np.isfinite(values).all(axis=1)]
-        spread = model.signature.state_scale.spread[[*map(model.states.index, motions)]]
         moved = (values - values[-1]) / spread
         column = np.argmax(np.abs(moved).max(axis=0))
         first = np.argmax(np.abs(moved[:, column]))
-        released = free_decay(values[first:, column], model.dt)
+        noise = run[motions[column]].attrs.get("noise_std", 0.0)
+        found = free_decay(values[first:, column], model.dt, noise)
+        if not found.cycles:
+            raise DataError("no motion swings above its noise. Was anything released?")
         keys = ("period", "damping_ratio", "p", "q", "cycles")
-        facts = {"motion": motions[column], **{key: getattr(released, key) for key in keys}}
-        cycles = {"amplitude": released.amplitudes, "decrement": released.decrements}
+        facts = {"motion": motions[column], **{key: getattr(found, key) for key in keys}}
+        cycles = {"amplitude": found.amplitudes, "decrement": found.decrements}
         facts |= {key: ("cycle", each) for key, each in cycles.items()}
-        parts.append(xr.Dataset(facts, {"cycle": range(released.cycles)}))
-    names = xr.Variable("run", list(still))
-    return xr.concat(parts, names, join="outer").drop_vars("cycle")
+        return xr.Dataset(facts, {"cycle": range(found.cycles)})
+
+    parts = gathered(still, released, "no run in still water is a free decay.", "no decay from")
+    names = xr.Variable("run", list(parts))
+    return xr.concat([*parts.values()], names, join="outer").drop_vars("cycle")
 
 
 PERIODS = 32

@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray
+from seakeep.arrays import TINY, Datasets, FloatArray
 from seakeep.check.parts import Known, deviations, free_runs, irregular, judged, units_of
 from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
@@ -13,6 +13,8 @@ from seakeep.errors import SeakeepError
 from seakeep.models import Model
 from seakeep.signals import zero_up_crossings
 
+BAND = 2.0
+"""SDs of noise on either side of the mean that a record passes at a crossing."""
 HOURS = 3.0
 KINDS = ("measured", "forecast")
 PLACES = 161
@@ -23,7 +25,9 @@ def statistics(
 ) -> xr.Dataset:
     r"""Peaks of each state over the test parts in irregular waves, measured and forecast.
 
-    A peak is the largest deviation from the mean of its run between two zero-up-crossings.
+    A peak is the largest deviation from the mean of its run between two zero-up-crossings. One
+    counts where the record goes from below to above the mean by two SDs of the sensor's noise,
+    ``attrs["noise_std"]`` of the channel.
 
     Parameters
     ----------
@@ -40,14 +44,15 @@ def statistics(
     Returns
     -------
     Dataset
-        Over (state, kind), kind "measured" or "forecast": ``significant_double_amplitude`` (four
-        SDs), ``zero_crossing_period`` (s), ``peaks`` (how many), ``rayleigh_scale`` (the SD),
-        ``weibull_shape`` and ``weibull_scale`` (maximum likelihood), ``extreme`` (most probable
-        in the duration by Weibull's law) with ``extreme_lower`` and ``extreme_upper`` (95 %, what
-        the fit does not know); over (state, kind, rank): ``peak`` and ``exceedance``, largest
-        first; over (state, kind, place): ``density`` of the deviations at ``deviation`` over
-        (state, place); over state: ``divergence`` (Jensen–Shannon) of the two densities, NaN where
-        one stands still. ``attrs["duration"]`` (s).
+        Over (state, kind), kind "measured" or "forecast": ``mean``,
+        ``significant_double_amplitude`` (four SDs), ``zero_crossing_period`` (s), ``peaks`` (how
+        many), ``rayleigh_scale`` (the SD), ``weibull_shape`` and ``weibull_scale`` (maximum
+        likelihood), ``extreme`` (most probable in the duration by Weibull's law) with
+        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know); over (state,
+        kind, rank): ``peak`` and ``exceedance``, largest first; over (state, kind, place):
+        ``density`` of the deviations at ``deviation`` over (state, place); over state:
+        ``divergence`` (Jensen–Shannon) of the two densities, NaN where one stands still.
+        ``attrs["duration"]`` (s).
 
     Raises
     ------
@@ -62,12 +67,17 @@ def statistics(
         duration = 3600 * HOURS / np.sqrt(scale)
     moved = {kind: deviations(known, kind) for kind in KINDS}
     parts = []
-    for column in range(len(model.states)):
-        laws = [_law([x[:, column] for x in of], model.dt, duration) for of in moved.values()]
+    for column, state in enumerate(model.states):
+        noise = [waves[name][state].attrs.get("noise_std", 0.0) for name in known]
+        laws = [
+            _law([x[:, column] for x in of], noise, model.dt, duration) for of in moved.values()
+        ]
         parts.append(xr.concat(laws, xr.Variable("kind", list(moved)), join="outer"))
     names = xr.Variable("state", model.states)
     out = xr.concat(parts, names, join="outer").drop_vars("rank").transpose("state", ...)
     deviation, density = _densities(np.array([np.concatenate(each) for each in moved.values()]))
+    means = [np.concatenate([getattr(x, k) for x in known.values()]).mean(axis=0) for k in KINDS]
+    out["mean"] = (("kind", "state"), means)
     out["deviation"] = (("state", "place"), deviation)
     out["density"] = (("state", "kind", "place"), density)
     divergence = [jensen_shannon(*x) if np.isfinite(x).all() else np.nan for x in density]
@@ -92,12 +102,12 @@ def _densities(both: FloatArray) -> tuple[FloatArray, FloatArray]:
     return grids, densities
 
 
-def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
+def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float) -> xr.Dataset:
     """Statistics of the deviations of several records of a state; peaks largest first."""
     every, between = [np.empty(0)], [np.empty(0)]  # peaks and zero-crossing periods
-    for x in moved:
+    for x, its_noise in zip(moved, noise, strict=True):
         with suppress(SeakeepError):  # without waves, or lost, a free run has no peaks
-            crossings = zero_up_crossings(x, dt)
+            crossings = zero_up_crossings(x, dt, BAND * its_noise / max(x.std(), TINY))
             if crossings.size > 1:
                 every.append(peaks_between(x, crossings / dt))
                 between.append(np.diff(crossings))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,7 @@ from seakeep.core.spectra import cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.engine import Dynamics
-from seakeep.models.labelled import mean_period
+from seakeep.models.labelled import Span, mean_period
 from seakeep.models.validity import Coverage
 
 WAVE = "wave"
@@ -184,7 +185,8 @@ def measured_response(model: Model, runs: Datasets) -> xr.Dataset:
     7.5-02-07-02.1: type A over the windows, type B from ``attrs["accuracy"]`` of the channels,
     their standard uncertainty). Runs in irregular waves together give a point per frequency, by
     cross-spectra with the reference probe in segments of 16 to 32 encounter periods; what leakage
-    does is judged from segments half as long.
+    does is judged from segments half as long. With an alignment of the model to the surge, waves
+    are those where the vessel was by its measured surge, else those at the probe.
 
     Parameters
     ----------
@@ -233,9 +235,21 @@ def measured_response(model: Model, runs: Datasets) -> xr.Dataset:
     return out.assign_attrs(reference=model.inputs[reference])
 
 
+def _answered(model: Model, part: Part, reference: int) -> tuple[FloatArray, FloatArray]:
+    """Wave of a part, where the model has it by the measured surge, and its states."""
+    alignment, size = model.signature.input_map.alignment, len(part.time)
+    if alignment is None:
+        return part.inputs[:, [reference]], part.states
+    if alignment.settings.surge == "predicted":
+        measured = replace(alignment.settings, surge="measured")
+        alignment = replace(alignment, settings=measured)
+    carried = alignment.carry(part.run.sel(time=part.time), [Span(0, size - 1, size)])
+    return carried[:, [reference]], part.states
+
+
 def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Dataset:
     names = [model.inputs[reference], *model.states]
-    both = np.concatenate([part.inputs[:, [reference]], part.states], axis=1)
+    both = np.concatenate(_answered(model, part, reference), axis=1)
     frequency = dominant_frequency(both[:, 0], model.dt)
     harmonics, means = harmonic_fits(both, model.dt, frequency)
     amplitude, *answer = np.abs(harmonics).mean(axis=0)
@@ -258,8 +272,8 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
 
 
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
-    pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
-    segment = segment_length(sum(len(part.time) for part in parts), AVERAGES, period, LONGEST)
+    pieces = [_answered(model, part, reference) for part in parts]
+    segment = segment_length(sum(len(wave) for wave, _ in pieces), AVERAGES, period, LONGEST)
     spectra, halves = (cross_spectra(pieces, model.dt, each) for each in (segment, segment // 2))
     gain, radius = spectra.gain()
     # Leakage shrinks with longer segments: the change from segments half as long, which is what it

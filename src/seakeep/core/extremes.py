@@ -120,7 +120,11 @@ def most_probable_extreme(law: Weibull, peaks: float) -> tuple[float, float, flo
 
 
 SMALLEST = 0.02
-"""Part of the largest half range below which an extreme counts as noise."""
+"""Part of the whole range below which a swing counts as noise."""
+NOISE = 4.0
+"""SDs of noise on either side that thousands of its samples hardly leave."""
+APART = 2.0
+"""Half periods of the largest swing after which the next extreme is another motion's."""
 
 
 class Decay(NamedTuple):
@@ -149,8 +153,12 @@ class Decay(NamedTuple):
     decrements: FloatArray
 
 
-def free_decay(series: FloatArray, dt: float) -> Decay:
+def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> Decay:
     """Period, p and q of a series that was released; a constant in it does not matter.
+
+    Swings count from the largest on, until one is lost in noise. Extremes are those of parabolas
+    through a third of a half period on either side, which shrink all of them alike; what follows
+    is weighted by amplitude, as noise matters by its inverse.
 
     Parameters
     ----------
@@ -158,6 +166,8 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
         From the release on.
     dt : float
         Time step.
+    noise : float, optional
+        Standard deviation of the noise of its sensor.
 
     Returns
     -------
@@ -170,37 +180,29 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
     >>> round(found.period / (2 * np.pi), 3), round(found.damping_ratio, 3)
     (1.0, 0.05)
     """
-    instants, values = _extremes(series)
-    ranges = 0.5 * np.abs(np.diff(values))
+    least = max(SMALLEST * np.ptp(series), 2 * NOISE * noise)
     nothing = Decay(np.nan, np.nan, np.nan, np.nan, 0, np.empty(0), np.empty(0))
-    if ranges.size < 2:
+    places = np.sort(
+        np.concatenate([signal.find_peaks(sign * series, prominence=least)[0] for sign in (1, -1)])
+    )
+    if places.size < 3:
         return nothing
-    first = int(np.argmax(ranges))  # other modes die out before
-    instants, ranges = instants[first:], ranges[first:]
-    above = ranges >= SMALLEST * ranges.max()
-    length = int(np.argmin(np.append(above, False)))
-    ranges = ranges[:length]
+    places = places[np.argmax(np.abs(np.diff(series[places]))) :]  # other modes die out before
+    window = 2 * max((places[1] - places[0]) // 3, 1) + 1
+    value, slope, bend = (
+        signal.savgol_filter(series, window, 2, deriv=order)[places] for order in range(3)
+    )
+    shift = -np.divide(slope, bend, out=np.zeros_like(bend), where=bend != 0)
+    gaps = np.diff(places + shift)
+    length = int(np.argmin(np.append(gaps < APART * gaps[0], False)))
     if length < 2:
         return nothing
+    gaps, ranges = gaps[:length], 0.5 * np.abs(np.diff(value + 0.5 * slope * shift))[:length]
     decrements = 2 * np.log(ranges[:-1] / ranges[1:])
     amplitudes = np.sqrt(ranges[:-1] * ranges[1:])
     p, q = float(decrements.mean()), np.nan
     if decrements.size >= 3:
-        q, p = map(float, np.polyfit(amplitudes, decrements, 1))
-    period = 2 * dt * float(np.diff(instants[: length + 1]).mean())
+        q, p = map(float, np.polyfit(amplitudes, decrements, 1, w=amplitudes))
+    period = 2 * dt * float(np.average(gaps, weights=ranges))
     ratio = float(p / np.hypot(2 * np.pi, p))
     return Decay(period, ratio, p, q, decrements.size, amplitudes, decrements)
-
-
-def _extremes(series: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Instants (samples) and values of extremes, maxima and minima in turn, between samples."""
-    least = SMALLEST * np.ptp(series)
-    places = np.sort(
-        np.concatenate([signal.find_peaks(sign * series, prominence=least)[0] for sign in (1, -1)])
-    )
-    before, here, after = series[places - 1], series[places], series[places + 1]
-    bend = before - 2 * here + after
-    shift = np.divide(0.5 * (before - after), bend, out=np.zeros_like(here), where=bend != 0)
-    values = here - 0.25 * (before - after) * shift
-    instants = places + shift
-    return instants, values

@@ -494,6 +494,8 @@ class _Trials:
         Candidates that are to come at most.
     made : dict of Trial
         By candidate.
+    rival : HankelSettings, optional
+        Of another kind that is no choice, and surely better.
     """
 
     search: Candidates
@@ -503,6 +505,7 @@ class _Trials:
     progress: Progress | None
     later: int = 0
     made: dict[Any, Trial] = field(default_factory=dict)
+    rival: HankelSettings | None = None
 
     def problem(self, candidate: HankelSettings) -> Problem:
         """The columns of a candidate."""
@@ -625,12 +628,15 @@ class Selected(Generic[Chosen]):
         How it was chosen, in words.
     readouts : tuple of FittedReadOut
         Read-outs of these settings, fitted.
+    rival : HankelSettings, optional
+        Settings of another kind, which the note names: they err less by more than the noise.
     """
 
     settings: Chosen
     rows: tuple[dict[str, Any], ...]
     note: str
     readouts: tuple[FittedReadOut, ...] = ()
+    rival: Any = None
 
     def describe(self) -> str:
         """Text: how the choice was made, and the best λ of each candidate."""
@@ -828,6 +834,7 @@ def select(
         tuple(_rows_of(trials.made, taken, level, seed)),
         _note(trials, taken, level, words),
         fitted,
+        trials.rival,
     )
 
 
@@ -912,7 +919,10 @@ def _rivalled(
         if not trials.problem(other).grows(other, own_level):
             score = made[other].at(own_level)
             words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
-            taken, level = (other, own_level) if is_varied else (taken, level)
+            if is_varied:
+                taken, level = other, own_level
+            else:
+                trials.rival = other.having(ridge=own_level)
             break
     if not is_varied:
         for other in others:

@@ -362,13 +362,13 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
     extreme = ("extreme", "extreme_lower", "extreme_upper")
-    scaled = _as_shown(result, "significant_double_amplitude", *extreme)
+    scaled = _as_shown(result, "mean", "significant_double_amplitude", *extreme)
     rows = []
     for own in entries(scaled, "state", "kind"):
         bounds = interval(own, "extreme", short)
         rows.append(
             (
-                *row(own, "shown", "kind", significant_double_amplitude=short),
+                *row(own, "shown", "kind", mean=short, significant_double_amplitude=short),
                 *row(own, zero_crossing_period=3, peaks=0, weibull_shape=2),
                 MISSING if bounds == MISSING else short(own["extreme"]),
                 bounds,

@@ -14,6 +14,7 @@ from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
 from seakeep.check.parts import whole_span
+from seakeep.conventions import in_waves
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
 from seakeep.models.conditions import disagreements
@@ -92,7 +93,8 @@ def fit_campaign(
     Returns
     -------
     Model
-        As the table's ``kind`` says.
+        As the table's ``kind`` says; where it states none and settings are chosen, a filter of the
+        waves (``"fir"``) if that errs less by more than the noise.
 
     Raises
     ------
@@ -114,14 +116,20 @@ def fit_campaign(
     spec, prepared, runs, stop = read_training(campaign, model, progress)
     dt = step_of(prepared)
     channels = list(settings.states), list(settings.inputs)
-    how: dict[str, Any] = {"executor": executor, "progress": progress} if left_open(spec) else {}
-    identified: Model = spec.fit(runs, *channels, stop=stop, **how)
+    open_spec, rival = left_open(spec), None
+    how: dict[str, Any] = {"executor": executor, "progress": progress} if open_spec else {}
+    if open_spec and "kind" not in settings.model_fields_set:
+        choice = open_spec.settled(runs, *channels, stop, **how)
+        how, rival = {"selected": choice}, choice.rival
+    identified: Any = (rival or spec).fit(runs, *channels, stop, **({} if rival else how))
+    if rival:
+        identified = replace(identified, selection=choice.note)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     # Other tests are not prepared for a warning.
     folder = prepared_folder(campaign)
     others = [n for n in campaign.test_runs if n not in both and (folder / f"{n}.nc").exists()]
-    for name, run in (both | load_prepared(campaign, names=others)).items():
+    for name, run in in_waves(both | load_prepared(campaign, names=others)).items():
         begin, end = whole_span(run, "test")
         warn_of_waves(identified, run, name, begin, round((end - begin) / dt))
     look_ahead = identified.signature.input_map.look_ahead

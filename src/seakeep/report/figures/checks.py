@@ -47,6 +47,7 @@ def by_state(
     if axes is None:
         side = "upper center" if each > 1 else "lower center"
         legend_outside(*places[:each], side=side)
+        figure.align_ylabels()
     return figure
 
 
@@ -299,6 +300,7 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
         place.set_ylim(0.3 / max(int(own["peaks"].max()), 1), 1.3)
         place.set_xlim(0, factor * level[-1])
         place.set(xlabel=f"peak of {label} [{unit}]", ylabel="exceeded by [1]")
+        place.locator_params("x", nbins=5)
 
     return by_state(result, axes, (3.0, 2.0), draw)
 
