@@ -14,8 +14,8 @@ FLAT = RNG.uniform(-1, 1, size=900)
 
 
 def rounding_of_bins(h):
-    # Linear interpolation of the kernel between bins of h/64: 1/8 · (1/64)² of its peak.
-    return 3.1e-5 / (h * np.sqrt(2 * np.pi))
+    # Linear interpolation of the kernel between bins of h/32: 1/8 · (1/32)² of its peak.
+    return 1.3e-4 / (h * np.sqrt(2 * np.pi))
 
 
 def test_the_papers_bandwidth_lacks_the_divisor():

@@ -443,7 +443,8 @@ def _problem(
                 pieces[f"{name}, part {number}"] = run.isel(time=samples)
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
-    data = gather(pieces, states, inputs, None, widest)
+    known = None if isinstance(folds, int) else chain
+    data = gather(pieces, states, inputs, None, widest, known)
     groups = tuple(pieces if isinstance(folds, int) else folds.values())
     return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
 

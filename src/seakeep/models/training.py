@@ -183,6 +183,7 @@ def gather(
     inputs: Sequence[str],
     stop: Stop,
     settings: HankelSettings,
+    input_map: InputMap | None = None,
 ) -> TrainingData:
     """Fit the input map, and collect the training windows of the runs.
 
@@ -196,6 +197,8 @@ def gather(
         Last instants, s.
     settings : HankelSettings
         Input maps, delays, window and scaling.
+    input_map : InputMap, optional
+        That of these runs, where it is known.
 
     Returns
     -------
@@ -216,7 +219,7 @@ def gather(
     dt = labelled.common_step(runs)
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    input_map = settings.input_map(runs, states, inputs, window)
+    input_map = input_map or settings.input_map(runs, states, inputs, window)
     reach = max(state_delays, input_map.history(input_delays))
     pieces, read = [], []
     for name, run in runs.items():

@@ -58,7 +58,7 @@ from seakeep.study.plan import (
 from seakeep.study.settings import Study
 from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, write_result
 
-EIGENVALUES_OF = 10
+EIGENVALUES_OF = 5
 """Members whose eigenvalues are computed: as many show where those of an ensemble lie."""
 
 
