@@ -377,7 +377,7 @@ CHANGES = {
         ("if made[taken].is_as_good_as(made[other]):", "if False:", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("own = {\"ridge\"} if", "own = {\"lead\"} if", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("if (starts := begin + self.starts(run, steps)).size:", "if (starts := 1 + begin + self.starts(run, steps)).size:", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
-        ("known[start][0][:, :steps] for start in at", "known[start][0][:, -steps:] for start in at", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
+        ("ours[start][:, :steps] for start in at", "ours[start][:, -steps:] for start in at", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("self.groups[other] != self.groups[run]]", "True]", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("replace(windows, zero=None)", "windows", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
         ("measured += (data.zeros[run] - windows.zero)[:, None]", "pass", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),

@@ -100,8 +100,10 @@ def _done(
             if not pending:
                 return
             finished = _wait_for_any(islice(pending, 1) if ordered else pending, executor)
-            # What is done is handed on before an error is.
+            # What is done is handed on before an error is, and nothing is begun after it.
             first = min(finished, key=lambda each: each.exception() is not None)
+            if any(each.exception() for each in finished):
+                waiting = iter(())
             piece_done = pending.pop(first), first.result()
             # A result that is still referred to would be computed again if its worker were lost.
             del finished, first

@@ -111,6 +111,8 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
         windows = made.forecast_windows(short, [10.0, START], STEPS, ahead="predict")
         assert np.isnan(windows["input_predicted_from"][0])
         assert float(windows["input_predicted_from"][1]) == members.attrs["input_predicted_from"]
+        alone = made.forecast_windows(short, [START], STEPS, ahead="predict")
+        assert alone.attrs["input_predicted_from"] == members.attrs["input_predicted_from"]
         assert set(windows["status"].values[0].ravel()) == {"ok"}
         assert set(windows["status"].values[1].ravel()) == {words}
     reduced = ensemble.summarize_windows(short, [10.0, START], STEPS, ahead="predict")

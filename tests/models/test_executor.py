@@ -52,6 +52,23 @@ def test_large_pieces_come_as_they_are_finished(pool):
     assert len({pid for pid, _ in found.values()}) == 2
 
 
+def test_nothing_is_begun_after_an_error():
+    begun = []
+
+    def piece(_, number):
+        begun.append(number)
+        if number == 5:
+            raise ValueError("piece 5")
+
+    def taken(threads):
+        for _ in as_finished(piece, None, range(200), threads):
+            time.sleep(0.001)  # whoever takes the results is slower than the work
+
+    with ThreadPoolExecutor(4) as threads, pytest.raises(ValueError, match="piece 5"):
+        taken(threads)
+    assert len(begun) <= 5 + 2 * executors.AHEAD  # those that were handed out before it was seen
+
+
 def test_arrays_do_not_depend_on_the_executor(ensemble_and_run, pool):
     ensemble, run = ensemble_and_run
     alone = ensemble.forecast_windows(run, [31.0, 33.0], 40)

@@ -125,6 +125,14 @@ def test_waves_that_none_of_their_period_is(height, slower, stated, told):
     assert not [*waves_of(Record("r", run, stated_period=stated, waves="still"))]
 
 
+def test_channels_that_hold_no_wave_are_left():
+    lost = np.where(T < 2 * DT, 0.1, np.nan)
+    run = record(DT, eta_fwd=np.full(T.size, np.nan), eta_aft=lost, surge=lost)
+    for name in ("eta_fwd", "eta_aft", "surge"):
+        run[name].attrs["units"] = "m"
+    assert not [*waves_of(Record("r", run))]
+
+
 FOUND = Finding(SamplesKind.DRIFT, "first", "pitch", np.deg2rad(5.0), 0.01, "rad")
 
 

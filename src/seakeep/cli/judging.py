@@ -125,14 +125,18 @@ def forecast(
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     left = round((float(prepared["time"][-1]) - first) / identified.dt)
     warn_of_waves(identified, prepared, run, first, left if count is None else count)
-    play: Any = identified.forecast
-    how: dict[str, Any] = {"ahead": ahead}
-    with executor_of(workers, scheduler) as executor, progress_bar("Forecasting") as progress:
-        if is_ensemble(identified):
-            how |= {"executor": executor, "progress": progress}
-            if not members:
-                play, how = identified.forecast_summary, how | band_options
-        result = play(prepared, first, count, **how)
+    if is_ensemble(identified):
+        with (
+            executor_of(workers, scheduler) as executor,
+            progress_bar("Forecasting") as progress,
+        ):
+            how: Any = {"ahead": ahead, "executor": executor, "progress": progress}
+            if members:
+                result = identified.forecast(prepared, first, count, **how)
+            else:
+                result = identified.forecast_summary(prepared, first, count, **how, **band_options)
+    else:
+        result = identified.forecast(prepared, first, count, ahead=ahead)
     scaled = ""
     if full_scale:
         scale = _scale(read)

@@ -198,6 +198,7 @@ def read_groups(
                 own = labelled.opened(runs[name], name, signature.dt, labels)
                 opened[name] = _Opened(runs[name], *own)
             spans[-1].append(opened[name].span(signature, start, steps, predicts))
+            opened[name].spans.append(spans[-1][-1])
     for each in opened.values():
         each.drive(signature, predicts)
     return [
@@ -396,8 +397,7 @@ class _Opened:
                 f"{shown(time[-1])} s{ahead}. At most {max(most, 0)} steps can be forecast from "
                 "there; ahead = 'predict' continues the input by linear prediction."
             )
-        self.spans.append(Span(at - signature.input_delays, at, at + count))
-        return self.spans[-1]
+        return Span(at - signature.input_delays, at, at + count)
 
     def drive(self, signature: Signature, predicts: bool) -> None:
         """Read what drives all forecasts of the run, once every span is known."""
@@ -440,15 +440,11 @@ class _Opened:
         self.known = missing - 1
         names = [each for each in (*signature.inputs, *signature.states) if each in self.run]
         run = self.run[names].reindex(time=self.instants(0, stop, signature.dt))
-        return [
-            run.assign(
-                {
-                    name: run[name].copy(data=each)
-                    for name, each in zip(signature.inputs, future.T, strict=True)
-                }
-            )
-            for future in futures
-        ]
+        continued = []
+        for future in futures:
+            columns = zip(signature.inputs, future.T, strict=True)
+            continued.append(run.assign({name: run[name].copy(data=x) for name, x in columns}))
+        return continued
 
 
 def filled(

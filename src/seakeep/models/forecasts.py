@@ -457,7 +457,8 @@ def windows_dataset(
         words = {"units": "s", "long_name": "first instant that depends on predicted input"}
         coords["input_predicted_from"] = ("window", instants, words)
     variables = label_channels(signature, values, ("window", inner, "lead"))
-    return xr.Dataset(variables | more, coords=coords, attrs=windows.notes)
+    notes = {**windows.notes, **(outcome(windows, 0) if len(starts) == 1 else {})}
+    return xr.Dataset(variables | more, coords=coords, attrs=notes)
 
 
 def outcome(windows: Windows, window: int, lost: int = -1) -> dict[str, float]:

@@ -377,14 +377,15 @@ class Problem:
             for _, each, _ in read
         ]
         runs = linear_runs(models, groups) if groups else []
-        known: dict[int, tuple[FloatArray, FloatArray]] = {}
+        ours: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
+        truth: dict[int, FloatArray] = {}
         for (starts, _, measured), computed in zip(read, runs, strict=True):
-            pairs = zip(computed.swapaxes(0, 1), measured, strict=True)
-            known |= zip(starts, pairs, strict=True)
+            ours |= zip(starts, computed.swapaxes(0, 1), strict=True)
+            truth |= zip(starts, measured, strict=True)
         for steps in horizons:
             if at := self.starts(run, steps).tolist():
-                predicted = np.stack([known[start][0][:, :steps] for start in at], axis=1)
-                measured = np.stack([known[start][1][:steps] for start in at])
+                predicted = np.stack([ours[start][:, :steps] for start in at], axis=1)
+                measured = np.stack([truth[start][:steps] for start in at])
                 yield FreeRuns(predicted, measured, models[0].signature.state_scale.std)
 
     def _fitted_runs(

@@ -165,10 +165,11 @@ def waves(record: Record) -> Findings:
     """
     dt = step_of(record.whole)
     for name, channel in channels_of(record.whole).items():
+        if not is_elevation(name) or channel.attrs["units"] != "m" or record.waves == "still":
+            continue
         x = sound(record.whole, name)
-        period = dominant_period(x, dt)
-        is_wave = is_elevation(name) and channel.attrs["units"] == "m" and record.waves != "still"
-        if not is_wave or np.isnan(period) or noise_share(x) > 0.5:
+        period = dominant_period(x, dt) if x.size > 1 else np.nan
+        if np.isnan(period) or noise_share(x) > 0.5:
             continue
         height, length = 4 * float(x.std()), GRAVITY * period**2 / (2 * np.pi)
         if record.water_depth and height > record.water_depth:  # which `impossible` reports

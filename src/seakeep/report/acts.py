@@ -335,11 +335,11 @@ class Claims(Evidence):
             ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
             return ours / sea
 
-        differences = {
-            words: both.interval(ratio, cells, np.broadcast_to(regular, cells.shape[:2]))
-            for key, words in HEADING.items()
-            for cells in [both.cells((), key)]
-        }
+        differences = {}
+        for key, words in HEADING.items():
+            cells = both.cells((), key)
+            labels = np.broadcast_to(regular, cells.shape[:2])
+            differences[words] = both.interval(ratio, cells, labels)
         return _changes(differences), all_of(
             [differences["ANRMSE"].above(1.0), differences["NAMMAE"].below(1.0)]
         )

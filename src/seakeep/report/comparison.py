@@ -70,9 +70,10 @@ def _by_channel(
     at: xr.Dataset, name: str, title: str, columns: Iterable[Iterable[str]], note: str = ""
 ) -> Table:
     """A row per channel of a run, and one of averages where columns have it; headings first."""
-    run, names = at["run"].values, ["channel", *map(str, at["channel"].values), "average"]
-    heads, *rows = zip(names, *columns, strict=False)
-    averages = range(at.sizes["channel"], len(rows))
+    run, names = at["run"].values, ["channel", *map(str, at["channel"].values)]
+    every = list(map(list, columns))
+    averages = range(len(names) - 1, len(every[0]) - 1)
+    heads, *rows = zip([*names, *["average"] * len(averages)], *every, strict=True)
     return Table(f"{name}_{run}", f"{run}: {title}", heads, rows, note, averages=averages)
 
 
