@@ -5,6 +5,7 @@ import inspect
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_array_equal
 
 from seakeep import core, metrics, signals, statistics, waves
 from seakeep.arrays import (
@@ -117,9 +118,9 @@ def test_what_the_message_says(values, message):
 
 
 def test_what_is_taken_as_it_is():
-    np.testing.assert_array_equal(as_real(np.ma.MaskedArray(X), "x"), X)
-    np.testing.assert_array_equal(as_real(xr.DataArray(X), "x"), X)
-    np.testing.assert_array_equal(as_real([True, 2, np.float32(3)], "x"), [1, 2, 3])
+    assert_array_equal(as_real(np.ma.MaskedArray(X), "x"), X)
+    assert_array_equal(as_real(xr.DataArray(X), "x"), X)
+    assert_array_equal(as_real([True, 2, np.float32(3)], "x"), [1, 2, 3])
     assert as_real(X, "x") is X
 
 

@@ -5,6 +5,7 @@ import runpy
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from pages import page
 from places import ROOT
 from records import record
@@ -77,10 +78,10 @@ def test_a_reader(add, tmp_path, name):
     t = 0.1 * np.arange(50)
     path = tmp_path / name
     path.write_bytes(b"RAW1" + np.column_stack([t, np.sin(t)]).tobytes())
-    np.testing.assert_array_equal(formats.read_columns(path).values["heave"], np.sin(t))
+    assert_array_equal(formats.read_columns(path).values["heave"], np.sin(t))
     (tmp_path / "campaign.toml").write_text(f"[channels.heave]\n[runs.a]\nfile = '{name}'\n")
     run = seakeep.read_campaign(tmp_path / "campaign.toml").prepare()["a"]
-    np.testing.assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
+    assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
     (tmp_path / "text.raw").write_text("time,heave\n0,1\n1,2\n")
     with pytest.raises(
         DataError, match=r"text\.raw is not a valid RAW file: it holds text and starts with"
@@ -122,7 +123,7 @@ def test_an_observable(add, tmp_path):
     again = seakeep.load_model(model.save(tmp_path / "slope.nc"))
     forecast = again.forecast(run, start=10.0, steps=300)
     # The moments leave out the first samples: 2 of 600.
-    np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
+    assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
 
 
 OWN = page("howto/own_method.md").partition("```python\n")[2].partition("```")[0]
@@ -137,7 +138,7 @@ def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add,
     own = Own(0, 8, ridge=2.0, lead=2).fit(run, states, ["eta_cog"])
     fir = FIR(8, ridge=2.0, ridge_scale="absolute", lead=2).fit(run, states, ["eta_cog"])
     # Normal equations of another order.
-    np.testing.assert_allclose(own.coefficients, fir.coefficients, rtol=0, atol=1e-9)
+    assert_allclose(own.coefficients, fir.coefficients, rtol=0, atol=1e-9)
     put_tutorial(
         tmp_path,
         STUDY.replace(
@@ -173,7 +174,7 @@ def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_p
     again = seakeep.load_model(model.save(tmp_path / "fading.nc"))
     forecast = again.forecast(run, start=10.0, steps=2)
     start, mean = run.heave.values[200], float(run.heave.mean())
-    np.testing.assert_allclose(forecast.heave.values[1], mean + 0.99**2 * (start - mean))
+    assert_allclose(forecast.heave.values[1], mean + 0.99**2 * (start - mean))
     assert again.summary().startswith("The state at the start, fading to the mean, dt 0.05 s")
 
     add("a figure", SECTIONS)

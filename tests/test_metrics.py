@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 from seakeep import RequestError, metrics
@@ -29,27 +30,25 @@ def both(predicted=PREDICTED, measured=MEASURED):
 
 def test_nrmse_by_hand():
     # Arithmetic of four numbers: rounding alone, here and below.
-    np.testing.assert_allclose(metrics.nrmse(**both()), np.sqrt([0.5, 50.0]) / SD, rtol=1e-14)
+    assert_allclose(metrics.nrmse(**both()), np.sqrt([0.5, 50.0]) / SD, rtol=1e-14)
 
 
 def test_error_over_time_by_hand():
     errors = np.array([[1.0, 0.0], [0.0, 10.0], [1.0, 0.0], [0.0, 10.0]])
-    np.testing.assert_allclose(
-        metrics.error_over_time(**both()), (errors / SD).mean(axis=1), rtol=1e-14
-    )
+    assert_allclose(metrics.error_over_time(**both()), (errors / SD).mean(axis=1), rtol=1e-14)
 
 
 def test_nammae_by_hand():
     # Minima 1 and 0, 10 and 10; maxima 3 and 4, 50 and 40.
     each = 0.5 * np.array([1.0 + 1.0, 0.0 + 10.0]) / SD
-    np.testing.assert_allclose(metrics.normalised_extremes_error(**both()), each, rtol=1e-14)
+    assert_allclose(metrics.normalised_extremes_error(**both()), each, rtol=1e-14)
     assert metrics.nammae(**both()) == pytest.approx(each.mean(), rel=1e-14)
 
 
 def test_fit_percent_is_matlabs_formula():
     # 100 (1 − ‖y − ŷ‖ / ‖y − mean(y)‖), as the help page of compare states it.
     expected = 100 * (1 - np.sqrt([2.0, 200.0]) / np.sqrt([8.0, 500.0]))
-    np.testing.assert_allclose(metrics.fit_percent(**both()), expected, rtol=1e-13)
+    assert_allclose(metrics.fit_percent(**both()), expected, rtol=1e-13)
 
 
 # Who is left out
@@ -70,9 +69,7 @@ def test_a_slack_channel_is_nan_and_left_out_of_averages(part):
         assert values[0] == measure(**alone)[0]
     for average in AVERAGES:
         assert average(**arguments) == average(**alone)
-    np.testing.assert_array_equal(
-        metrics.error_over_time(**arguments), metrics.error_over_time(**alone)
-    )
+    assert_array_equal(metrics.error_over_time(**arguments), metrics.error_over_time(**alone))
 
 
 @pytest.mark.parametrize("value", [0.0, 0.1, 1e5 / 3])
@@ -98,7 +95,7 @@ def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
         assert np.isfinite(values[0])
         assert np.isnan(values[1])
     over_time = metrics.error_over_time(**both(diverged))
-    np.testing.assert_array_equal(np.isnan(over_time), [False, False, True, True])
+    assert_array_equal(np.isnan(over_time), [False, False, True, True])
 
 
 # Datasets
@@ -109,14 +106,12 @@ def test_datasets_give_what_arrays_give():
     for measure in OF_CHANNELS:
         result = measure(**datasets)
         assert list(result.data_vars) == ["heave", "mooring_bow"]
-        np.testing.assert_array_equal(
-            [float(result.heave), float(result.mooring_bow)], measure(**both())
-        )
+        assert_array_equal([float(result.heave), float(result.mooring_bow)], measure(**both()))
     for average in AVERAGES:
         assert average(**datasets) == average(**both())
     over_time = metrics.error_over_time(**datasets)
-    np.testing.assert_array_equal(over_time, metrics.error_over_time(**both()))
-    np.testing.assert_array_equal(over_time.time, datasets["predicted"].time)
+    assert_array_equal(over_time, metrics.error_over_time(**both()))
+    assert_array_equal(over_time.time, datasets["predicted"].time)
     members = labelled(np.stack([PREDICTED, MEASURED]), dims=("member", "time"))
     pair = both(members, datasets["measured"])
     assert metrics.nrmse(**pair).heave.dims == metrics.anrmse(**pair).dims == ("member",)
@@ -179,7 +174,7 @@ def test_a_forecast_that_ends_in_nan_has_no_interval():
     predicted = 0.9 * measured
     predicted[-1, 1] = np.nan
     pair = both(predicted, measured)
-    np.testing.assert_array_equal(
+    assert_array_equal(
         np.isnan(metrics.nrmse(**pair, interval=0.9)), [[False, True], [False, True]]
     )
     assert np.isnan(metrics.anrmse(**pair, interval=0.9)).all()
@@ -199,11 +194,11 @@ def test_errors_that_models_share_cancel_in_their_difference():
     found = metrics.anrmse_differences([first, half, equal], measured)
     for name, of in (("anrmse", first), ("all_anrmse", first)):
         own = [metrics.anrmse(predicted=p, measured=m) for p, m in zip(of, measured, strict=True)]
-        np.testing.assert_array_equal(found[name][0], own if name == "anrmse" else np.mean(own))
+        assert_array_equal(found[name][0], own if name == "anrmse" else np.mean(own))
     # Half the error in every sample is half the ANRMSE in every draw, to rounding.
     for key in ("change", "lower", "upper"):
-        np.testing.assert_allclose(found[key], [[0, 0], [-0.5, -0.5], [0, 0]], atol=1e-12)
-        np.testing.assert_allclose(found[f"all_{key}"], [0, -0.5, 0], atol=1e-12)
+        assert_allclose(found[key], [[0, 0], [-0.5, -0.5], [0, 0]], atol=1e-12)
+        assert_allclose(found[f"all_{key}"], [0, -0.5, 0], atol=1e-12)
 
 
 def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
@@ -212,6 +207,6 @@ def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
     for part, slack in ((0.49, False), (0.51, True)):
         pair = both(measured, measured)
         found = metrics.is_slack(**pair, noise_std=np.sqrt(part) * spread)
-        np.testing.assert_array_equal(found, [slack, slack])
+        assert_array_equal(found, [slack, slack])
     noisy = labelled(measured, noise_std=0.8)  # stated with the measurement
     assert all(metrics.is_slack(predicted=labelled(measured), measured=noisy).values())

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_array_equal
 
 from seakeep import DataError, RequestError, metrics
 from seakeep.pairing import pair
@@ -21,8 +22,8 @@ def test_dimensions_are_matched_by_name():
     paired = pair(predicted=members.transpose("time", "window", "member"), measured=WINDOWS)
     assert paired.lead == ("window", "member")
     assert paired.arrays["predicted"].shape == (3, 2, 6, 2)
-    np.testing.assert_array_equal(paired.arrays["predicted"][:, 0], paired.arrays["measured"][:, 0])
-    np.testing.assert_array_equal(paired.arrays["measured"][2, 1, :, 1], PITCH + 2)
+    assert_array_equal(paired.arrays["predicted"][:, 0], paired.arrays["measured"][:, 0])
+    assert_array_equal(paired.arrays["measured"][2, 1, :, 1], PITCH + 2)
     # One measurement for all windows is not spread out.
     assert pair(predicted=members, measured=MEASURED).arrays["measured"].shape == (6, 2)
     slack = metrics.is_slack(predicted=WINDOWS, measured=WINDOWS * [[0.0], [1.0], [1.0]])
@@ -32,7 +33,7 @@ def test_dimensions_are_matched_by_name():
 
 def test_samples_are_matched_where_no_instants_are_stated():
     bare = pair(predicted=MEASURED.drop_vars("time"), measured=MEASURED)
-    np.testing.assert_array_equal(bare.arrays["predicted"], bare.arrays["measured"])
+    assert_array_equal(bare.arrays["predicted"], bare.arrays["measured"])
     with pytest.raises(RequestError, match="measured has 6 samples along time and predicted 5"):
         pair(predicted=MEASURED.drop_vars("time").isel(time=slice(5)), measured=MEASURED)
 

@@ -3,6 +3,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from seakeep.waves import GRAVITY, group_speed, phase_speed, wavelength_to_frequency, wavenumber
 
@@ -10,17 +11,17 @@ from seakeep.waves import GRAVITY, group_speed, phase_speed, wavelength_to_frequ
 def test_deep_water():
     omega = np.array([0.5, 1.0, 5.0])
     # The closed form, to rounding.
-    np.testing.assert_allclose(wavenumber(omega), omega**2 / GRAVITY, rtol=1e-15)
-    np.testing.assert_allclose(phase_speed(omega), GRAVITY / omega, rtol=1e-15)
-    np.testing.assert_allclose(group_speed(omega), 0.5 * GRAVITY / omega, rtol=1e-12)
+    assert_allclose(wavenumber(omega), omega**2 / GRAVITY, rtol=1e-15)
+    assert_allclose(phase_speed(omega), GRAVITY / omega, rtol=1e-15)
+    assert_allclose(group_speed(omega), 0.5 * GRAVITY / omega, rtol=1e-12)
 
 
 def test_shallow_water():
     depth, omega = 2.0, 1e-4
     # The first correction is of the order (kh)²/6 = 3e-10.
     speed = np.sqrt(GRAVITY * depth)
-    np.testing.assert_allclose(phase_speed(omega, depth), speed, rtol=1e-8)
-    np.testing.assert_allclose(group_speed(omega, depth), speed, rtol=1e-8)
+    assert_allclose(phase_speed(omega, depth), speed, rtol=1e-8)
+    assert_allclose(group_speed(omega, depth), speed, rtol=1e-8)
     assert phase_speed(0.0, depth) == group_speed(0.0, depth) == speed
     assert wavenumber(0.0, depth) == 0.0
 
@@ -28,9 +29,9 @@ def test_shallow_water():
 def test_speeds_of_the_paper():
     omega = wavelength_to_frequency(1.40 * np.array([1.5, 2.0, 3.0]), depth=3.6)
     # Printed with three decimals, 1.8107 rounded up and 2.0909 and 2.5607 cut off.
-    np.testing.assert_allclose(phase_speed(omega, depth=3.6), [1.811, 2.090, 2.560], atol=1e-3)
+    assert_allclose(phase_speed(omega, depth=3.6), [1.811, 2.090, 2.560], atol=1e-3)
     # Printed group speeds are halves of these; at the longest wave, kh = 5.4, so are ours.
-    np.testing.assert_allclose(group_speed(omega, depth=3.6), [0.905, 1.045, 1.280], atol=1.5e-3)
+    assert_allclose(group_speed(omega, depth=3.6), [0.905, 1.045, 1.280], atol=1.5e-3)
 
 
 def test_group_speed_is_the_slope_of_the_dispersion_relation():
@@ -39,7 +40,7 @@ def test_group_speed_is_the_slope_of_the_dispersion_relation():
     omega = [wavelength_to_frequency(2 * np.pi / (k + d), depth) for d in (-h, h)]
     # Central difference: truncation of the order h², rounding of the order eps/h = 1e-11.
     slope = (omega[1] - omega[0]) / (2 * h)
-    np.testing.assert_allclose(
+    assert_allclose(
         group_speed(wavelength_to_frequency(2 * np.pi / k, depth), depth), slope, rtol=1e-8
     )
 
@@ -48,7 +49,7 @@ def test_group_speed_is_the_slope_of_the_dispersion_relation():
 def test_length_to_frequency_and_back(length, depth):
     k = wavenumber(wavelength_to_frequency(length, depth), depth)
     # Newton's method ends at rounding; ω² and tanh cost a few digits more.
-    np.testing.assert_allclose(2 * np.pi / k, length, rtol=1e-12)
+    assert_allclose(2 * np.pi / k, length, rtol=1e-12)
 
 
 def test_no_number_of_a_sea_overflows():

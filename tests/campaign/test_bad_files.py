@@ -7,6 +7,7 @@ import h5py
 import matlab73
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import io
 from small_tank import CAMPAIGN, tank_columns, write_csv
 
@@ -131,7 +132,7 @@ def test_a_sound_file_under_another_name_is_recognised(tmp_path, make, suffix):
     path = tmp_path / "run.x"
     make(path)
     path = path.rename(tmp_path / f"run{suffix}")
-    np.testing.assert_array_equal(read_table(path)["heave"], HEAVE)
+    assert_array_equal(read_table(path)["heave"], HEAVE)
 
 
 # Runs and files that state different units.
@@ -151,7 +152,7 @@ def prepared(tank, header, text=CAMPAIGN):
 def test_each_header_counts_for_its_own_run(tank, unit):
     same = prepared(tank, "mm")["second"]
     # One product with another rounded factor.
-    np.testing.assert_allclose(prepared(tank, unit)["second"]["heave"], same["heave"],
+    assert_allclose(prepared(tank, unit)["second"]["heave"], same["heave"],
                                rtol=1e-12, atol=1e-15)  # fmt: skip
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import two_loggers
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from tutorial_study import TUTORIAL
 
 import seakeep
@@ -43,9 +44,9 @@ def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign
     for delay in ("0.1 T", "1 T"):
         found = sent(chain_of(campaign, delay=delay), rows)
         time = found["time"].values
-        np.testing.assert_allclose(np.diff(time), float(offline.attrs["dt"]), rtol=1e-9)
+        assert_allclose(np.diff(time), float(offline.attrs["dt"]), rtol=1e-9)
         expected = offline.sel(time=time, method="nearest")
-        np.testing.assert_allclose(expected["time"], time, atol=1e-9)
+        assert_allclose(expected["time"], time, atol=1e-9)
         assert time[-1] <= 60.0 - campaign.seconds(delay)
         errors[delay] = {
             name: float(np.std(found[name].values - expected[name].values) / expected[name].std())
@@ -86,7 +87,7 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
     kept = (time < 20.0) | (time > 23.0)
     gapped = {name: each[kept] for name, each in rows.items()}
     found, whole = (sent(chain_of(campaign), each) for each in (gapped, rows))
-    np.testing.assert_array_equal(found["time"], whole["time"])
+    assert_array_equal(found["time"], whole["time"])
     inside = (found["time"] > 20.1) & (found["time"] < 22.9)
     assert found["heave"].isel(time=inside).isnull().all()
     after = found["time"] > 40.0

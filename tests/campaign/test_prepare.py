@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
@@ -33,11 +34,11 @@ def rewrite(tank, change, name="second.csv"):
 
 def test_raw_run_is_in_si_units(campaign):
     run, raw = campaign.read_run("first"), tank_columns(0)
-    np.testing.assert_array_equal(run["time"], raw["Time [s]"])
+    assert_array_equal(run["time"], raw["Time [s]"])
     # One product with a rounded factor.
-    np.testing.assert_allclose(run["heave"], 1e-3 * raw["Heave [mm]"], rtol=1e-15)
-    np.testing.assert_allclose(run["pitch"], np.deg2rad(raw["Pitch (deg)"]), rtol=1e-14)
-    np.testing.assert_allclose(run["acc"], 9.80665 * raw["acc [g]"], rtol=1e-15)
+    assert_allclose(run["heave"], 1e-3 * raw["Heave [mm]"], rtol=1e-15)
+    assert_allclose(run["pitch"], np.deg2rad(raw["Pitch (deg)"]), rtol=1e-14)
+    assert_allclose(run["acc"], 9.80665 * raw["acc [g]"], rtol=1e-15)
     assert {str(n): each.attrs["units"] for n, each in run.items()} == {
         "eta_fwd": "m", "heave": "m", "pitch": "rad", "acc": "m/s^2", "pitch_rate": "rad/s",
     }  # fmt: skip
@@ -51,7 +52,7 @@ def test_offset_is_added_in_the_files_unit_before_the_sign(changed):
     run = changed(('column = "Heave"', stated)).read_run("first")
     # heave = -(reading + 250 mm)
     expected = -(tank_columns(0)["Heave [mm]"] + 250) * 1e-3
-    np.testing.assert_allclose(run["heave"], expected, rtol=1e-15)  # order of two products
+    assert_allclose(run["heave"], expected, rtol=1e-15)  # order of two products
     assert run["heave"].attrs["accuracy"] == pytest.approx(0.5e-3)  # mm
     assert "accuracy" not in run["eta_fwd"].attrs
 
@@ -78,8 +79,8 @@ def test_prepared_runs(campaign):
     runs = campaign.prepare(progress=lambda *call: calls.append(call))
     assert calls == [(1, 2, "first"), (2, 2, "second")]
     first, second = runs["first"], runs["second"]
-    np.testing.assert_allclose(first["time"], np.arange(201) * 0.1, rtol=1e-15)
-    np.testing.assert_allclose(second["time"], 2 + np.arange(161) * 0.1, rtol=1e-15)
+    assert_allclose(first["time"], np.arange(201) * 0.1, rtol=1e-15)
+    assert_allclose(second["time"], 2 + np.arange(161) * 0.1, rtol=1e-15)
     expected = {
         "run": "first",
         "role": "train and test",
@@ -103,7 +104,7 @@ def test_the_whole_record_is_resampled_and_then_cut(campaign):
     run = campaign.prepare(["second"])["second"]
     whole = resample(raw["pitch_rate"], raw["time"], np.arange(201) * 0.1)
     # Channels side by side are summed in another order.
-    np.testing.assert_allclose(run["pitch_rate"], whole[20:181], atol=1e-14)
+    assert_allclose(run["pitch_rate"], whole[20:181], atol=1e-14)
 
 
 def test_derived_at_the_files_own_rate(changed):
@@ -121,16 +122,16 @@ def test_derived_at_the_files_own_rate(changed):
         )
     ).read_run("first")
     acc, eta = run["acc"].to_numpy(), run["eta_fwd"].to_numpy()
-    np.testing.assert_array_equal(run["speed"], integrate(acc, DT, (0.3, 5.0)))
-    np.testing.assert_array_equal(run["way"], integrate(acc, DT, (0.3, 5.0), 2))
-    np.testing.assert_array_equal(run["twice"], 2 * eta)
-    np.testing.assert_array_equal(run["smooth"], low_pass(2 * eta, DT, 1.0))
-    np.testing.assert_array_equal(run["waves"], band_pass(run["pitch"], DT, (0.3, 5.0)))
+    assert_array_equal(run["speed"], integrate(acc, DT, (0.3, 5.0)))
+    assert_array_equal(run["way"], integrate(acc, DT, (0.3, 5.0), 2))
+    assert_array_equal(run["twice"], 2 * eta)
+    assert_array_equal(run["smooth"], low_pass(2 * eta, DT, 1.0))
+    assert_array_equal(run["waves"], band_pass(run["pitch"], DT, (0.3, 5.0)))
     assert run["waves"].attrs["units"] == "rad"
-    np.testing.assert_array_equal(run["group"], envelope_squared(eta, DT))
-    np.testing.assert_array_equal(run["pitch_rate"], differentiate(run["pitch"], DT))
+    assert_array_equal(run["group"], envelope_squared(eta, DT))
+    assert_array_equal(run["pitch_rate"], differentiate(run["pitch"], DT))
     # 'unit' is that of the expression's value: millimetres, kept as metres.
-    np.testing.assert_allclose(run["sway"], run["heave"], rtol=1e-15)
+    assert_allclose(run["sway"], run["heave"], rtol=1e-15)
     units = {n: run[n].attrs["units"] for n in ("speed", "way", "smooth", "group", "sway")}
     assert units == {"speed": "m/s", "way": "m", "smooth": "m", "group": "m^2", "sway": "m"}
     assert run["way"].attrs["long_name"] == "way of the bow"
@@ -143,7 +144,7 @@ def test_the_step_is_the_stated_one(changed, rate, dt):
     assert campaign.encounter_period() == 1.6
     for run in campaign.prepare().values():
         assert (run.attrs["dt"], run.attrs["encounter_period"]) == (dt, 1.6)
-        np.testing.assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
+        assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
 
 
 def test_the_step_is_the_files_own(changed):
@@ -151,7 +152,7 @@ def test_the_step_is_the_files_own(changed):
     run = campaign.prepare()["first"]
     raw = campaign.read_run("first")
     assert run.attrs["dt"] == DT
-    np.testing.assert_array_equal(run["heave"], raw["heave"])
+    assert_array_equal(run["heave"], raw["heave"])
 
 
 def test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one(changed, tank):

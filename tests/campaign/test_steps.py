@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from seas import sea
 from small_tank import tank_columns, write_csv
 
@@ -97,7 +98,7 @@ def test_motions_are_transferred_to_another_point(tmp_path):
         for order, kind in enumerate(("", "_rate", "_acceleration")):
             found = run[f"bow_{name}{kind}"]
             # Eighth-order differences of differences leave 1e-7 of accelerations of 1 m/s².
-            np.testing.assert_allclose(found, rate(bow, order)(T)[:, axis], atol=1e-6)
+            assert_allclose(found, rate(bow, order)(T)[:, axis], atol=1e-6)
             assert "m from where it was measured" in found.attrs["derived_from"]
     # The transfer is no trifle: without it heave of the bow would be off by its own size.
     assert abs(run["bow_heave"] - run["heave"]).max() > 0.1
@@ -121,7 +122,7 @@ def test_gravity_is_removed_from_accelerometers(tmp_path, zeroed):
     run = prepared(tmp_path, columns, text)
     for i, name in enumerate(AXES):
         found = run[f"{name}_acceleration"]
-        np.testing.assert_allclose(found, acceleration[:, i], atol=1e-6)
+        assert_allclose(found, acceleration[:, i], atol=1e-6)
         assert found.attrs["derived_from"] == f"a_{'xyz'[i]}, gravity removed by roll, pitch, yaw"
     # What gravity adds along the deck, g sin(pitch), is larger than the motion itself.
     assert abs(run["surge_acceleration"] - run["a_x"]).max() > 1.0
@@ -137,7 +138,7 @@ def test_gravity_is_removed_from_one_accelerometer(tmp_path, axis):
     columns["a [m/s^2]"] = along + G * turn[:, 2, i]
     text += f"[channels.a]\n[derived.free]\nfrom = 'a'\nstep = 'remove_gravity'\naxis = '{axis}'\n"
     run = prepared(tmp_path, columns, text)
-    np.testing.assert_allclose(run["free"], along, atol=1e-9)
+    assert_allclose(run["free"], along, atol=1e-9)
 
 
 @pytest.mark.parametrize("outliers", ["replace", "flag"])
@@ -155,10 +156,10 @@ def test_outliers_are_flagged_and_replaced_when_asked(tank, first, outliers):
         assert run["heave"].max() > 0.8
         assert "repaired" not in run["heave"].attrs
         return
-    np.testing.assert_array_equal(marked, np.flatnonzero(flags.values & bits["replaced"]))
+    assert_array_equal(marked, np.flatnonzero(flags.values & bits["replaced"]))
     clean = 1e-3 * tank_columns(0)["Heave [mm]"]
     # One or two samples of a wave of 50: what a monotone cubic puts there is off by 1 %.
-    np.testing.assert_allclose(run["heave"], clean, atol=0.01 * np.ptp(clean))
+    assert_allclose(run["heave"], clean, atol=0.01 * np.ptp(clean))
     assert run["heave"].attrs["repaired"] == "4 outliers replaced by monotone cubics"
 
 
@@ -187,7 +188,7 @@ def test_the_paper_preset_of_the_preparation(tmp_path):
     assert found[3] == pytest.approx(1.0, abs=0.02)
     folded = np.cos(2 * np.pi * (32 / PERIOD - 9.9) * inner["time"])
     # As a cosine of 9.61 Hz: the same samples, within the ripple of 60 dB twice.
-    np.testing.assert_allclose(inner["tone_9p9"], folded, atol=2.5e-3)
+    assert_allclose(inner["tone_9p9"], folded, atol=2.5e-3)
 
 
 def two_probes(folder, positions, spans=""):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from records import record
 from scipy import signal
 
@@ -60,9 +61,9 @@ def test_records_shorter_than_the_lags_add_what_they_have():
     # Products at lags 0 to 3: 10, -7, 4, -2 of the long record and 18, -9 of the short one.
     expected = np.array([28.0, -16.0, 4.0, -2.0]) / 28
     for pieces in ([long, short], [short, long]):
-        np.testing.assert_allclose(autocorrelation(pieces, 9)[:, 0], expected, atol=1e-15)
+        assert_allclose(autocorrelation(pieces, 9)[:, 0], expected, atol=1e-15)
         found, _ = input_correlation([(each, each) for each in pieces], 9)
-        np.testing.assert_allclose(found[:, 0, 0], expected, atol=1e-15)  # rounding of an FFT
+        assert_allclose(found[:, 0, 0], expected, atol=1e-15)  # rounding of an FFT
 
 
 def test_limits_of_the_correlation_with_inputs_cover_as_they_say():

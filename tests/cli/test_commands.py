@@ -6,9 +6,9 @@ import shlex
 import shutil
 from unittest.mock import ANY
 
-import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from tables import rows_of
 from tutorial_study import edit, put_tutorial
 
@@ -83,7 +83,7 @@ def test_forecast_writes_netcdf_and_csv_alike(run, place):
         assert not out
         assert "50 instants after t = 20 s, status ok" in err
     heave = [float(row["heave [m]"]) for row in rows_of(place / "f.csv")]
-    np.testing.assert_array_equal(xr.load_dataset(place / "f.nc")["heave"], heave)  # all digits
+    assert_array_equal(xr.load_dataset(place / "f.nc")["heave"], heave)  # all digits
 
 
 FROM_20 = f"{CAMPAIGN} --run unseen --start 20 --steps 50"
@@ -110,12 +110,12 @@ def test_the_margin_of_a_calibrated_band_is_that_of_the_ensemble(run, place):
     expected = ensemble.calibrate(part, steps=200, level=0.9, scale="constant")
     margin = expected.calibration.conformal.margin
     found = seakeep.load_model(place / "wide.nc").calibration
-    np.testing.assert_array_equal(found.conformal.margin, margin)
+    assert_array_equal(found.conformal.margin, margin)
     _, err = run(f"forecast wide.nc {FROM_20} --band calibrated -o wide_band.nc")
     assert "mean, std and 90 % calibrated band of 8 members" in err
     stored = xr.load_dataset(place / "wide_band.nc")["heave"].sel(statistic="upper")
     band = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)["heave"].sel(statistic="upper")
-    np.testing.assert_array_equal(stored, band + margin[0])
+    assert_array_equal(stored, band + margin[0])
 
 
 def test_compare_judges_models_in_service_against_lead_time(run, place):
@@ -283,7 +283,7 @@ def test_full_scale_by_froudes_law(run, place):
     small, full = (xr.load_dataset(place / f"{n}_scale.nc") for n in ("model", "full"))
     # Froude: lengths by the scale, times by its root; loads by its cube.
     for name, factor in {"heave": 25, "pitch": 1, "mooring_bow": 25**3, "time": 5}.items():
-        np.testing.assert_allclose(full[name], factor * small[name], rtol=1e-12)
+        assert_allclose(full[name], factor * small[name], rtol=1e-12)
     assert full.attrs["start"] == pytest.approx(5 * small.attrs["start"], rel=1e-12)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from seakeep.core.response import clip_modes
 
@@ -34,8 +35,8 @@ def test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots(roots):
     found, moduli = clip_modes(companion(roots), 0.99)
     moved = np.where(np.abs(roots) > 0.99, 0.99 * roots / np.abs(roots), roots)
     # Roots as far apart as these are known to ten digits.
-    np.testing.assert_allclose(found, companion(moved), atol=1e-9)
-    np.testing.assert_allclose(moduli, sorted(np.abs(roots)[np.abs(roots) > 0.99])[::-1], rtol=1e-9)
+    assert_allclose(found, companion(moved), atol=1e-9)
+    assert_allclose(moduli, sorted(np.abs(roots)[np.abs(roots) > 0.99])[::-1], rtol=1e-9)
 
 
 @pytest.mark.parametrize("regressed", [3, 12])
@@ -48,8 +49,6 @@ def test_stable_modes_keep_eigenvalues_and_right_eigenvectors(regressed):
     after, vectors = np.linalg.eig(whole(rows))
     kept = np.abs(after) <= radius * (1 - 1e-9)
     assert len(moduli) == np.count_nonzero(np.abs(before) > radius)
-    np.testing.assert_allclose(
-        whole(found) @ vectors[:, kept], vectors[:, kept] * after[kept], atol=1e-9
-    )
+    assert_allclose(whole(found) @ vectors[:, kept], vectors[:, kept] * after[kept], atol=1e-9)
     # Moved modes may share an angle, and a double eigenvalue is known to half the digits.
     assert np.abs(np.linalg.eigvals(whole(found))).max() == pytest.approx(radius, rel=1e-6)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from matrices import Problem
+from numpy.testing import assert_allclose
 
 from seakeep.core import embed, rollout
 from seakeep.core.embedding import TrainingWindow
@@ -63,7 +64,7 @@ def test_every_form_gives_the_papers_formula(problem, ridge, kind):
     for method in ("primal", "dual", "svd", None):
         options = {"all_rows": all_rows, "method": method, "state_delays": delays}
         found = problem.solved(ridge, **options).coefficients
-        np.testing.assert_allclose(found, expected, atol=RESULT)
+        assert_allclose(found, expected, atol=RESULT)
 
 
 @given(problems(), st.integers(1, 9))
@@ -73,7 +74,7 @@ def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
     kept = min(rank, int(np.sum(values > values[0] * 1e-12)))
     expected = targets @ right[:kept].T / values[:kept] @ left[:, :kept].T
     found = problem.solved(0.0, rank=rank).coefficients
-    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+    assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
 @given(
@@ -88,7 +89,7 @@ def test_lagged_sums_are_products_with_a_hankel_matrix(seed, count, channels, la
     series = rng.normal(size=(count + lags + 1, channels))
     left = rng.normal(size=(count, rows))
     hankel = embed(series, lags - 1, lags, count)
-    np.testing.assert_allclose(lagged_sums(left, series, lags, lags), left.T @ hankel.T, atol=TIGHT)
+    assert_allclose(lagged_sums(left, series, lags, lags), left.T @ hankel.T, atol=TIGHT)
 
 
 def stepwise(a, b, state, inputs, delays, direct, count):
@@ -137,4 +138,4 @@ def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
             rollout(a[:rows], b[:rows], start, series, n_states=N, **options)
             for start, series in ((histories, driving), (extended, np.concatenate(embedded, 2)))
         ]
-    np.testing.assert_allclose(found, [expected] * 2, atol=RESULT)
+    assert_allclose(found, [expected] * 2, atol=RESULT)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from seakeep.core.kalman import DelayFilter, process_noise
 
@@ -40,15 +41,15 @@ def test_it_is_the_textbook_filter_with_rows_missing():
             rows = np.eye(N, SIZE, SIZE - N)[seen]
             textbook.update(y[seen], R=np.diag(noise[seen]), H=rows)
         # Hundreds of products of numbers of order one.
-        np.testing.assert_allclose(state, textbook.x, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(ours.covariance, textbook.P, rtol=0, atol=1e-10)
+        assert_allclose(state, textbook.x, rtol=0, atol=1e-10)
+        assert_allclose(ours.covariance, textbook.P, rtol=0, atol=1e-10)
 
 
 def test_errors_of_today_are_carried_as_the_model_carries_them():
     found = DelayFilter(A, PROCESS, np.zeros(N), START).ahead(5)
     carried = np.linalg.matrix_power(companion(), 5)
     expected = np.diagonal(carried @ START @ carried.T)[-N:]
-    np.testing.assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
+    assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
 
 
 @pytest.mark.parametrize(("exactly", "factors"), [(False, [0.5, 1.0]), (True, [0.5, 2.0])])
@@ -57,11 +58,11 @@ def test_a_limit_scales_a_state_with_its_correlations(exactly, factors):
     filter_ = DelayFilter(A, PROCESS, np.zeros(N), covariance)
     filter_.limit(np.diagonal(covariance)[-N:] * [0.25, 4.0], exactly=exactly)
     scale = np.append(np.ones(SIZE - N), factors)
-    np.testing.assert_allclose(filter_.covariance, covariance * np.outer(scale, scale), rtol=1e-14)
+    assert_allclose(filter_.covariance, covariance * np.outer(scale, scale), rtol=1e-14)
 
 
 def test_residuals_less_measurement_noise_are_process_noise():
     noise = np.array([0.02, 0.01])
     residual = PROCESS + np.diag(noise) + (A * np.tile(noise, S + 1)) @ A.T
-    np.testing.assert_allclose(process_noise(residual, A, noise), PROCESS, rtol=1e-12)
+    assert_allclose(process_noise(residual, A, noise), PROCESS, rtol=1e-12)
     assert np.linalg.eigvalsh(process_noise(PROCESS, A, 10 * noise)).min() > 0

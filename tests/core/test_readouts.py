@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.core.readouts import KNOTS, LoadMap, best_place, features, floor_of, sums, weights_of
 
@@ -19,7 +20,7 @@ def test_features_are_those_of_the_recipe():
         *(1.25, -3.0, 3.0, 1.5625, -3.75, 0.75),
         *(-3.0, 3.0, -3.0, 3.0, -1.5, 1.5),  # wet above 0, 0.5 and 1 SD, over half an SD
     ]
-    np.testing.assert_array_equal(found, expected)
+    assert_array_equal(found, expected)
 
 
 def test_weights_of_a_load_of_known_form_are_recovered_but_for_the_ridge():
@@ -32,9 +33,9 @@ def test_weights_of_a_load_of_known_form_are_recovered_but_for_the_ridge():
     found = weights_of(products)
     # λ pulls combinations of nearly collinear features; without it they are exact.
     gram, right = products[:-1, :-1].copy(), products[:-1, -1]
-    np.testing.assert_allclose(np.linalg.solve(gram, right), [7.0, *known], atol=1e-8)
+    assert_allclose(np.linalg.solve(gram, right), [7.0, *known], atol=1e-8)
     gram[np.diag_indices_from(gram)] += 1e-2 * len(values) * (np.arange(len(gram)) > 0)
-    np.testing.assert_allclose(gram @ found, right, rtol=1e-9)
+    assert_allclose(gram @ found, right, rtol=1e-9)
 
 
 def test_the_place_is_the_one_that_other_runs_vouch_for():
@@ -65,7 +66,7 @@ def test_a_load_gives_way_to_its_state_outside_training():
     wave = np.array([[0.0, 0.0], [2.0, 2.0], [0.0, 0.0], [0.0, 3.0], [2.5, 0.0]])
     # The regression says 3 and is clipped to 2.5; half of the weight is left half an SD outside.
     parts = np.array([1.0, 1.0, 1 / 2, 1 / 2, 1 / 6])
-    np.testing.assert_allclose(load(states, wave), 9.0 + parts * (2.5 - 9.0), rtol=1e-15)
+    assert_allclose(load(states, wave), 9.0 + parts * (2.5 - 9.0), rtol=1e-15)
 
 
 @pytest.mark.parametrize("taut", [0.5, 0.8, 0.98])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matrices import Problem
+from numpy.testing import assert_allclose
 
 from seakeep.core import training_window
 from seakeep.core.solve import GRAM_LIMIT, NARROW_LIMIT
@@ -55,10 +56,10 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, part, al
     # rows of the inverse from its structure lose up to two more where there are fewer columns than
     # regressors, where they are not chosen (5e-10 at the median of 60 draws, 2e-8 at the worst).
     largest = np.abs(svd).max()
-    np.testing.assert_allclose(chosen.coefficients, svd, rtol=0, atol=1e-10 * largest)
-    np.testing.assert_allclose(dual, svd, rtol=0, atol=1e-10 * largest)
+    assert_allclose(chosen.coefficients, svd, rtol=0, atol=1e-10 * largest)
+    assert_allclose(dual, svd, rtol=0, atol=1e-10 * largest)
     lost = 200 if all_rows and shape == WIDE else 1
-    np.testing.assert_allclose(primal, svd, rtol=0, atol=lost * 1e-10 * largest)
+    assert_allclose(primal, svd, rtol=0, atol=lost * 1e-10 * largest)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +87,7 @@ def test_the_newest_rows_alone_are_regressed_with_less(part, digits):
     assert found.method == "primal"
     # A condition number of 1e8 or 1e10 of sixteen digits, with a margin of five.
     atol = 5 * 10.0**-digits * np.abs(svd).max()
-    np.testing.assert_allclose(found.coefficients, svd, rtol=0, atol=atol)
+    assert_allclose(found.coefficients, svd, rtol=0, atol=atol)
     assert made.solved(0.99 * NARROW_LIMIT * trace, all_rows=False).method == "svd"
 
 
@@ -94,4 +95,4 @@ def test_without_ridge_dependent_regressors_share_their_weight():
     states = np.repeat(3.0 ** np.arange(6.0)[:, None], 2, axis=1)
     solution = of(states, np.zeros((6, 0)), 0, 0, 5).solved(0.0)
     assert solution.rank == 1
-    np.testing.assert_allclose(solution.coefficients, np.full((2, 2), 1.5), rtol=1e-14)  # rounding
+    assert_allclose(solution.coefficients, np.full((2, 2), 1.5), rtol=1e-14)  # rounding

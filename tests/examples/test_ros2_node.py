@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from loaded import loaded
+from numpy.testing import assert_allclose, assert_array_equal
 from places import ROOT
 from scipy.spatial.transform import Rotation
 
@@ -64,7 +65,7 @@ def test_complete_samples_are_the_steps_of_the_live_model(model, run):
     found = play(follower, messages(model, run, jitter=0.2))
     for sample, (instant, state) in enumerate(found):
         u, y = ([run[name].values[sample] for name in of] for of in (model.inputs, model.states))
-        np.testing.assert_array_equal(state, expected.step(u, y))
+        assert_array_equal(state, expected.step(u, y))
         assert instant == pytest.approx(CLOCK + sample * DT, abs=0.1 * DT)
     assert len(found) == COUNT
     assert not follower.lost
@@ -81,7 +82,7 @@ def test_any_order_of_arrival_within_patience_gives_the_same_estimates(model, ru
         both = [Follower(model.live, patience=PATIENCE) for _ in range(2)]
         found = [play(each, stream) for each, stream in zip(both, (sent, late), strict=True)]
         assert [instant for instant, _ in found[0]] == [instant for instant, _ in found[1]]
-        np.testing.assert_array_equal(states(found[0]), states(found[1]))
+        assert_array_equal(states(found[0]), states(found[1]))
         assert both[0].lost == both[1].lost
 
     same()
@@ -102,7 +103,7 @@ def test_what_is_lost_is_estimated_and_counted(model, run):
     follower = Follower(model.live)
     found = play(follower, sent)
     assert len(found) == COUNT
-    np.testing.assert_array_equal(states(found), states(play(Follower(model.live), kept)))
+    assert_array_equal(states(found), states(play(Follower(model.live), kept)))
     assert follower.lost == {
         ("heave", "early"): 1,
         ("pitch", "late"): 1,
@@ -184,7 +185,7 @@ def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
         assert list(each.name) == model.states
         if at not in (60, 61):
             measured = [float(run[name].values[at]) for name in model.states]
-            np.testing.assert_allclose(each.position, measured, atol=1e-12)  # via a quaternion
+            assert_allclose(each.position, measured, atol=1e-12)  # via a quaternion
     forecast = vessel.published["~/forecast"][-1]
     assert list(forecast.joint_names) == model.states
     assert len(forecast.points) == round(10.0 / DT)
@@ -206,4 +207,4 @@ def test_angles_of_a_quaternion(node, turn):
     angles = [node.read(quaternion(turn), name) for name in ("yaw", "pitch", "roll")]
     # asin is steep where the bow points upwards.
     found, turned = Rotation.from_euler("ZYX", [angles, turn]).as_quat()
-    np.testing.assert_allclose(found, turned, atol=1e-7)
+    assert_allclose(found, turned, atol=1e-7)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matlab73 import save as matlab73
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import io
 
 from seakeep.campaign import read_table
@@ -18,9 +19,9 @@ HEAVE, WAVE = np.sin(T), np.cos(T)
 
 
 def check(run, unit="mm"):
-    np.testing.assert_array_equal(run["time"], T)
-    np.testing.assert_array_equal(run["heave"], HEAVE)
-    np.testing.assert_array_equal(run["wave"], WAVE)
+    assert_array_equal(run["time"], T)
+    assert_array_equal(run["heave"], HEAVE)
+    assert_array_equal(run["wave"], WAVE)
     assert run["heave"].attrs.get("units") == unit
     assert set(run.data_vars) == {"heave", "wave"}
 
@@ -52,7 +53,7 @@ def test_matlab(tmp_path, content, save):
     save(tmp_path / "run.mat", content)
     run = read_table(tmp_path / "run.mat")
     # A step of 0.05 turned into a rate and back: rounding.
-    np.testing.assert_allclose(run["time"], T, rtol=1e-15)
+    assert_allclose(run["time"], T, rtol=1e-15)
     check(run.assign_coords(time=T))
 
 
@@ -116,7 +117,7 @@ def test_hdf5_sets_of_several_columns_are_split(tmp_path):
         file["picture"] = np.zeros((200, 65))
     columns = ["acc_1", "acc_2", "acc_3"]
     run = read_table(tmp_path / "run.h5", columns=columns)
-    np.testing.assert_array_equal(run["acc_2"], WAVE)
+    assert_array_equal(run["acc_2"], WAVE)
     assert [run[name].attrs["units"] for name in columns] == ["m/s2"] * 3
     with pytest.raises(DataError, match=r"'picture' has 65 columns without names; beyond 64"):
         read_table(tmp_path / "run.h5", columns=["picture"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy
 from matlab73 import MatFile
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.campaign import read_table
 from seakeep.formats import read_columns
@@ -21,7 +22,7 @@ def test_a_file_that_matlab_wrote():
         pytest.skip("this build of scipy leaves its tests out")
     columns = read_columns(path)
     assert columns.names == ["testdouble"]
-    np.testing.assert_allclose(columns.values["testdouble"], np.linspace(0, 2 * np.pi, 9))
+    assert_allclose(columns.values["testdouble"], np.linspace(0, 2 * np.pi, 9))
 
 
 @pytest.mark.oracle
@@ -32,7 +33,7 @@ def test_files_of_another_writer(tmp_path):
     run = {"time": T[:, None], "heave": HEAVE[:, None], "units": {"heave": "mm"}}
     storage.savemat(str(tmp_path / "run.mat"), {"run": run}, format="7.3")
     table = read_table(tmp_path / "run.mat")
-    np.testing.assert_array_equal(table["heave"], HEAVE)
+    assert_array_equal(table["heave"], HEAVE)
     assert table["heave"].attrs["units"] == "mm"
 
 

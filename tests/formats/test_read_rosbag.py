@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.campaign import read_table
 from seakeep.campaign.readers import checksum
@@ -78,9 +79,9 @@ def test_a_standard_message(tmp_path, plugin, what):
         path = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
     run = read_table(path)
     # Seconds from the first reception: header stamps are 3 ms earlier; a float of ns is exact here.
-    np.testing.assert_allclose(run["time"], T - 0.003, atol=1e-12)
-    np.testing.assert_allclose(run["receive_time"], T, atol=1e-12)
-    np.testing.assert_array_equal(run["angular_velocity.y"], RATE)
+    assert_allclose(run["time"], T - 0.003, atol=1e-12)
+    assert_allclose(run["receive_time"], T, atol=1e-12)
+    assert_array_equal(run["angular_velocity.y"], RATE)
     units = {name: run[name].attrs.get("units") for name in run.data_vars}
     assert units["angular_velocity.y"] == "rad/s"
     assert units["linear_acceleration.z"] == "m/s^2"
@@ -90,15 +91,15 @@ def test_a_standard_message(tmp_path, plugin, what):
 
 def test_the_times_of_reception_on_request(tmp_path):
     run = read_table(save(tmp_path, mru=imu), FileSettings(time="receive_time"))
-    np.testing.assert_allclose(run["time"], T, atol=1e-12)
+    assert_allclose(run["time"], T, atol=1e-12)
     with pytest.raises(RequestError, match="the column 'time' cannot be a channel"):
         read_table(tmp_path / "bag", FileSettings(time="receive_time"), columns=["time"])
 
 
 def test_a_message_of_ones_own(tmp_path):
     run = read_table(save(tmp_path, rig=rig))
-    np.testing.assert_array_equal(run["surge"], np.arange(COUNT))
-    np.testing.assert_array_equal(run["loads[1]"], -np.arange(COUNT))
+    assert_array_equal(run["surge"], np.arange(COUNT))
+    assert_array_equal(run["loads[1]"], -np.arange(COUNT))
     assert "units" not in run["surge"].attrs
     assert "remark" not in run
 
@@ -123,14 +124,14 @@ def test_topics_count_from_one_instant(tmp_path):
     path = save(tmp_path, early=number, mru=imu)
     first = read_table(path, FileSettings(group="/early"))["time"]
     second = read_table(path, FileSettings(group="/mru"))["receive_time"]
-    np.testing.assert_array_equal(first, second)
+    assert_array_equal(first, second)
 
 
 def test_headers_that_are_not_stamped(tmp_path):
     path = save(tmp_path, mru=lambda i: imu(i, stamped=False))
     with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):
         run = read_table(path)
-    np.testing.assert_allclose(run["time"], T, atol=1e-12)
+    assert_allclose(run["time"], T, atol=1e-12)
     path = save(tmp_path / "some", rig=lambda i: rig(i, stamped=i > 4))
     with pytest.raises(DataError, match="5 of 100 messages of the topic '/rig' have no stamp"):
         read_table(path)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
@@ -34,8 +35,8 @@ def test_waveforms(tmp_path):
     )
     run = read_table(path)
     # The file holds a step, not times: both are its multiples up to rounding.
-    np.testing.assert_allclose(run["time"], 2.5 + T, rtol=1e-15)
-    np.testing.assert_array_equal(run["heave"], HEAVE)
+    assert_allclose(run["time"], 2.5 + T, rtol=1e-15)
+    assert_array_equal(run["heave"], HEAVE)
     assert set(run.data_vars) == {"heave", "wave"}
     assert (run["heave"].attrs["units"], run["wave"].attrs["units"]) == ("mm", "m")
 
@@ -48,8 +49,8 @@ def test_a_time_channel_and_integers(tmp_path):
         channel("remark", ["x"] * 200),
     )
     run = read_table(path)
-    np.testing.assert_allclose(run["time"], T, rtol=1e-12)
-    np.testing.assert_array_equal(run["count"], np.arange(200.0))
+    assert_allclose(run["time"], T, rtol=1e-12)
+    assert_array_equal(run["count"], np.arange(200.0))
     assert set(run.data_vars) == {"count"}
 
 
@@ -58,7 +59,7 @@ def test_time_stamps_count_from_the_first(tmp_path):
     stamps = start + (1e6 * T).round().astype("timedelta64[us]")
     path = save(tmp_path, channel("Time", stamps), channel("heave", HEAVE))
     # Time stamps are written in microseconds here.
-    np.testing.assert_allclose(read_table(path)["time"], T, atol=1e-6)
+    assert_allclose(read_table(path)["time"], T, atol=1e-6)
 
 
 def test_scaled_channels(tmp_path):
@@ -72,7 +73,7 @@ def test_scaled_channels(tmp_path):
         "wf_increment": STEP,
     }
     path = save(tmp_path, channel("load", np.arange(200, dtype=np.int32), **scale))
-    np.testing.assert_array_equal(read_table(path)["load"], 10 + 0.5 * np.arange(200))
+    assert_array_equal(read_table(path)["load"], 10 + 0.5 * np.arange(200))
 
 
 def test_groups(tmp_path):

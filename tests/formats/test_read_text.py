@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
@@ -27,7 +28,7 @@ def check_plain(run):
     assert run["Heave"].dims == ("time",)
     values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
     for name, expected in (values | {"WP 1": [3, 4, 5]}).items():
-        np.testing.assert_array_equal(run[name], expected)
+        assert_array_equal(run[name], expected)
     units = {str(name): each.attrs.get("units") for name, each in run.items()}
     assert units == {"Heave": "mm", "Pitch": "deg", "WP 1": None}
 
@@ -65,14 +66,14 @@ def test_blanks(tmp_path):
     run = read_table(write(tmp_path, text, "run.txt"))
     assert list(run.data_vars) == ["Heave", "Pitch"]
     assert run["Heave"].attrs["units"] == "mm"
-    np.testing.assert_array_equal(run["Pitch"], [-2, 2])
+    assert_array_equal(run["Pitch"], [-2, 2])
 
 
 def test_options(tmp_path):
     text = "made by a logger\nRecord 7\n! remark\nclock|heave\n".replace("|", ";") + "0;1\n50;2\n"
     options = FileSettings(skip_rows=2, comment="!", time="clock", time_unit="ms", delimiter=";")
     run = read_table(write(tmp_path, text), options)
-    np.testing.assert_allclose(run["time"], [0, 0.05], rtol=1e-15)
+    assert_allclose(run["time"], [0, 0.05], rtol=1e-15)
     message = (
         r"has no column with a usual name of times\. State time = 'NAME' or sampling_rate "
         r"\(Hz\) in \[files\]\. Its columns: clock, heave"
@@ -86,9 +87,9 @@ def test_options(tmp_path):
 def test_time_in_the_unit_that_its_name_ends_on(tmp_path, name, stated):
     path = write(tmp_path, f"{name};heave\n0;1\n20;2\n")
     run = read_table(path, FileSettings(time=stated and name))
-    np.testing.assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
+    assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
     slow = read_table(path, FileSettings(time=name, time_unit="s"))  # a name is no header
-    np.testing.assert_array_equal(slow["time"], [0, 20])
+    assert_array_equal(slow["time"], [0, 20])
 
 
 def test_a_unit_of_time_stated_against_the_header(tmp_path):
@@ -104,7 +105,7 @@ def test_a_unit_of_time_stated_against_the_header(tmp_path):
     with pytest.raises(RequestError, match="the unit 'm' does not fit the time column 't'"):
         read_table(write(tmp_path, "t [m],heave\n0,1\n1,2\n"))
     rated = read_table(path, FileSettings(sampling_rate=10))  # what the message proposes
-    np.testing.assert_array_equal(rated["time"], [0, 0.1])
+    assert_array_equal(rated["time"], [0, 0.1])
 
 
 def test_latin_1_is_read_and_said(tmp_path):
@@ -143,16 +144,16 @@ def test_commas_that_may_divide_thousands_are_refused(tmp_path):
     ):
         read_table(path)
     run = read_table(path, FileSettings(decimal=","))  # what the message proposes
-    np.testing.assert_array_equal(run["h"], [999, 1.234, 12.345])
+    assert_array_equal(run["h"], [999, 1.234, 12.345])
     for cell in ("0,512", ",512", "1,5", "1234,567", "1,2345", "-0,500"):  # decimals for certain
         run = read_table(write(tmp_path, f"t;h\n0;1,234\n1;{cell}\n"))
-        np.testing.assert_array_equal(run["h"], [1.234, float(cell.replace(",", "."))])
+        assert_array_equal(run["h"], [1.234, float(cell.replace(",", "."))])
 
 
 def test_missing_values_are_nan(tmp_path):
     run = read_table(write(tmp_path, "t,a,b\n0,,nan\n1,NaN,1\n2,3,\n"))
-    np.testing.assert_array_equal(run["a"], [np.nan, np.nan, 3])
-    np.testing.assert_array_equal(run["b"], [np.nan, 1, np.nan])
+    assert_array_equal(run["a"], [np.nan, np.nan, 3])
+    assert_array_equal(run["b"], [np.nan, 1, np.nan])
 
 
 def test_a_column_by_its_full_header(tmp_path):
@@ -181,7 +182,7 @@ def test_round_trip(tmp_path, values, delimiter, comma, bracketed, compressed):
         lines.append([repr(float(x)).replace(".", point) for x in (i, *row)])
     raw = "".join(delimiter.join(line) + "\n" for line in lines).encode()
     run = read_table(write(tmp_path, gzip.compress(raw, mtime=0) if compressed else raw))
-    np.testing.assert_array_equal(np.column_stack([each for _, each in run.items()]), values)
+    assert_array_equal(np.column_stack([each for _, each in run.items()]), values)
     assert [each.attrs["units"] for _, each in run.items()] == units[1:]
 
 
@@ -259,4 +260,4 @@ def test_heads_of_loggers(tmp_path, head):
     run = read_table(write(tmp_path, head + ROWS))
     assert run["Heave"].attrs["units"] == "mm"
     assert run["Pitch"].attrs["units"] == "deg"
-    np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
+    assert_array_equal(run["WP 1"], [3, 4, 5])

@@ -2,8 +2,8 @@
 
 import shutil
 
-import numpy as np
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from places import ROOT
 
 from seakeep.models.labelled import nearest_sample
@@ -85,12 +85,12 @@ def assert_cells_are_what_the_models_say(found, plan, **near):
                 for channel in plan.states:
                     ours = cell.sel(channel=channel)
                     spread = part[channel].values.std(ddof=1)
-                    np.testing.assert_allclose(ours["training_std"], spread, rtol=1e-9)
+                    assert_allclose(ours["training_std"], spread, rtol=1e-9)
                     mean = ours["mean"].sel(model="deterministic")
-                    np.testing.assert_allclose(mean, alone[channel], **near)
+                    assert_allclose(mean, alone[channel], **near)
                     ours = ours.sel(model="bayesian", ensemble="bayesian")
                     for key in ("mean", "std", "lower", "upper"):
                         expected = band[channel].sel(statistic=key)
-                        np.testing.assert_allclose(ours[key], expected, **near)
+                        assert_allclose(ours[key], expected, **near)
                     measured = run[channel].values[at : at + window.steps]
-                    np.testing.assert_array_equal(ours["measured"], measured)
+                    assert_array_equal(ours["measured"], measured)

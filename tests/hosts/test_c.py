@@ -7,6 +7,7 @@ import compiled
 import numpy as np
 import pytest
 from compiled import pointer
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep import ProbeAlignment
 from seakeep.hosts import write_c
@@ -56,12 +57,12 @@ def host(library, cases):
 @pytest.mark.parametrize("name", NAMES)
 def test_each_step_is_that_of_forecast_arrays(name, host, cases):
     case, run = cases[name], host(name)
-    np.testing.assert_array_equal(run.x, case.x_history[-1])
+    assert_array_equal(run.x, case.x_history[-1])
     for row, expected in zip(case.u[case.rows :], case.expected, strict=True):
         status = run.step(run.memory, pointer(row))
         assert status == (LOST if np.isnan(expected).any() else FINITE)
         # The same sums in another order, of numbers of the order of ten.
-        np.testing.assert_allclose(run.x, expected, rtol=1e-12, atol=1e-12)
+        assert_allclose(run.x, expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["full", "short", "following"])
@@ -72,7 +73,7 @@ def test_the_derivative_of_a_step_is_that_of_the_jacobian(name, host, library, c
     given = pointer(case.u[case.rows]), pointer(change)
     getattr(library, f"{name}_derivative")(run.memory, *given, pointer(found))
     # Differences of numbers of the order of ten over 1e-3, which cubes of waves bend by 1e-6.
-    np.testing.assert_allclose(found, on_inputs[:, -1] @ change, rtol=1e-5, atol=1e-9)
+    assert_allclose(found, on_inputs[:, -1] @ change, rtol=1e-5, atol=1e-9)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

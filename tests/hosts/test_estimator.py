@@ -7,6 +7,7 @@ import compiled
 import numpy as np
 import pytest
 from compiled import pointer
+from numpy.testing import assert_allclose
 from records import table
 
 from seakeep import HankelDMDc
@@ -125,10 +126,10 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
     # The same sums in another order.
     close = {"rtol": 0, "atol": 1e-12}
     for at in range(COUNT - 30):
-        np.testing.assert_allclose(*found.beside(live, u[at], y[at]), **close)
+        assert_allclose(*found.beside(live, u[at], y[at]), **close)
         if at > 20:
             expected = np.sqrt(np.maximum(np.diagonal(live.covariance), 0.0))
-            np.testing.assert_allclose(found.deviations, expected, rtol=1e-9, atol=1e-12)
+            assert_allclose(found.deviations, expected, rtol=1e-9, atol=1e-12)
         if at in (190, 305, 317, 640):
             lost = live.validity & Validity.LOST
             assert found.validity & Validity.LOST == lost
@@ -138,7 +139,7 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
             assert status == (1 if at == 5 else 0)
             if status == 0:
                 expected = moments(live.forecast(30, u[at + 1 : at + 30]), STATES)
-                np.testing.assert_allclose(forecast, expected, rtol=1e-9, atol=1e-12)
+                assert_allclose(forecast, expected, rtol=1e-9, atol=1e-12)
     # Waves that are not known, or of one probe for a while: the mean tends to that of training.
     part = np.full((199, 2), np.nan)
     part[:20, 0] = u[COUNT - 30 : COUNT - 10, 0]
@@ -149,7 +150,7 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
         assert status == 0
         # The departures are small differences of runs.
         expected = moments(live.forecast(200, known), STATES)
-        np.testing.assert_allclose(forecast, expected, rtol=1e-7, atol=1e-9)
+        assert_allclose(forecast, expected, rtol=1e-7, atol=1e-9)
         share = expected[1] / live.signature.state_scale.spread
         assert np.all((share[20] < 0.6) & (share[-1] > 0.9))  # all weight, and then less
 
@@ -165,7 +166,7 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     plan = np.full((29, 2), np.nan)
     plan[3:, 1] = np.linspace(0, 1, 26)
     expected = moments(live.forecast(30, {"eta_cog": plan[:, 1]}), STATES)
-    np.testing.assert_allclose(found.forecast(30, plan)[1], expected, rtol=1e-7, atol=1e-9)
+    assert_allclose(found.forecast(30, plan)[1], expected, rtol=1e-7, atol=1e-9)
 
 
 def test_an_input_that_is_no_wave_is_not_judged(library, model, make_run, tmp_path):
@@ -187,7 +188,7 @@ def test_a_probe_that_stands_still_is_predicted_to(library, model):
         u = np.full(2, 0.25 if at < 8 else np.nan)  # no rounding hides 0/0
         found.beside(live, u, np.full(2, 0.1 * at))
     last = found.beside(live, np.zeros(2), np.full(2, np.nan))  # reads what was predicted
-    np.testing.assert_allclose(*last, rtol=0, atol=1e-12)
+    assert_allclose(*last, rtol=0, atol=1e-12)
 
 
 def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
@@ -278,7 +279,7 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     # The same sums in another order, through gains of the order of ten.
     close = {"rtol": 0, "atol": (1e-10 if "following" in name else 1e-12) * np.nanmax(np.abs(y))}
     for at in range(340):
-        np.testing.assert_allclose(*found.beside(live, u[at], y[at]), **close, err_msg=str(at))
+        assert_allclose(*found.beside(live, u[at], y[at]), **close, err_msg=str(at))
         if at in (148, 190, 290, 309, 317, 339):
             given = live._known_inputs()[-40:]  # of 40 samples before
             for known in (None, given) if model.inputs else (None,):
@@ -286,4 +287,4 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
                 assert status == 0
                 expected = moments(live.forecast(20, known), model.states)
                 near = {"rtol": 1e-6, "atol": 100 * close["atol"]}  # small differences of runs
-                np.testing.assert_allclose(forecast, expected, **near, err_msg=str(at))
+                assert_allclose(forecast, expected, **near, err_msg=str(at))

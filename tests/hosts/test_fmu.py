@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep import HankelDMDc, RequestError
 from seakeep.hosts import write_fmu
@@ -98,8 +99,8 @@ def test_fmpy_simulates_what_forecast_arrays_forecasts(fmu, cases):
         input=given(rows, WAVES),
     )
     found = np.stack([result[name] for name in case.model.states], axis=1)
-    np.testing.assert_array_equal(found[0], case.x_history[-1])
-    np.testing.assert_allclose(found[1:], case.expected, rtol=1e-12, atol=1e-12)
+    assert_array_equal(found[0], case.x_history[-1])
+    assert_allclose(found[1:], case.expected, rtol=1e-12, atol=1e-12)
 
 
 OTHER_PROCESS = """
@@ -129,7 +130,7 @@ def test_another_process_goes_on_from_a_state_to_the_last_bit(slave, unpacked, c
     np.save(tmp_path / "inputs.npy", case.u[case.rows + 20 :])
     expected = run(slave, case, 20, len(case.expected))
     slave.setFMUstate(state)
-    np.testing.assert_array_equal(run(slave, case, 20, len(case.expected)), expected)
+    assert_array_equal(run(slave, case, 20, len(case.expected)), expected)
     slave.freeFMUstate(state)
     given = [unpacked, slave.guid, tmp_path / "state", tmp_path / "inputs.npy", case.model.dt]
     done = subprocess.run(
@@ -139,7 +140,7 @@ def test_another_process_goes_on_from_a_state_to_the_last_bit(slave, unpacked, c
         check=True,
     )
     found = [[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()]
-    np.testing.assert_array_equal(found, expected)
+    assert_array_equal(found, expected)
 
 
 def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
@@ -148,7 +149,7 @@ def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
     slave.setReal([0, 1], list(case.u[case.rows]))
     found = slave.getDirectionalDerivative([3, 2], [1], [2.0])
     # Cubes of waves bend the differences.
-    np.testing.assert_allclose(found, 2.0 * on_inputs[::-1, -1, 1], rtol=1e-5)
+    assert_allclose(found, 2.0 * on_inputs[::-1, -1, 1], rtol=1e-5)
     for unknown, known in ((0, 1), (2, 2)):
         with pytest.raises(Exception, match="fmi2GetDirectionalDerivative failed with status 3"):
             slave.getDirectionalDerivative([unknown], [known], [1.0])
@@ -203,9 +204,9 @@ def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samp
     live = model.live()
     expected = [live.step(*row) for row in zip(u, y, strict=True)]
     found = np.stack([result[name] for name in model.states], axis=1)
-    np.testing.assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)
+    assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)
     monkeypatch.setattr(type(live), "conditions", None)  # C does not widen outside the training
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, 1)))
     ahead = live.forecast(3)
     expected = [ahead[x].values[row, n] for row in (0, 1) for n in range(3) for x in model.states]
-    np.testing.assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)
+    assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)

@@ -1,7 +1,7 @@
 """ONNX graphs forecast what Python does, at once and step by step."""
 
-import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from seakeep.hosts import write_onnx
 
@@ -25,7 +25,7 @@ def test_a_horizon_is_that_of_forecast_arrays(name, cases, tmp_path):
     graph = session(case.model, tmp_path / "m.onnx", steps=len(case.expected))
     found, _ = graph.run(None, given(case, case.x_history, case.u))
     # The same sums in another order, of numbers of the order of ten.
-    np.testing.assert_allclose(found, case.expected, rtol=1e-12, atol=1e-12)
+    assert_allclose(found, case.expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["full", "short", "following"])
@@ -35,4 +35,4 @@ def test_steps_one_after_the_other_are_the_horizon(name, cases, tmp_path):
     for step, expected in enumerate(case.expected):
         u = case.u[step : step + case.rows + 1]
         found, history = graph.run(None, given(case, history, u))
-        np.testing.assert_allclose(found, expected[None], rtol=1e-12, atol=1e-12)
+        assert_allclose(found, expected[None], rtol=1e-12, atol=1e-12)

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from drifting import DEPTH, FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES
 from ensembles import few
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, RequestError
@@ -71,14 +72,14 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     expected = model.forecast(long, START, STEPS)
     # So far they err little, and weigh one; squares of what they err by move the surge.
     near = 1e-9 if len(model.regressors) == len(INPUTS) else 1e-3
-    np.testing.assert_allclose(table(found, STATES), table(expected, STATES), atol=near)
+    assert_allclose(table(found, STATES), table(expected, STATES), atol=near)
     # What is missing counts as not there, and what lies beyond it is not read.
     gone = drift.copy(deep=True)
     for name in INPUTS:
         gone[name].values[last + 1 : reads_until(model, drift) + 1] = np.nan
         gone[name].values[reads_until(model, drift) + 1 :] = 1e9
     again = model.forecast(gone, START, STEPS, ahead="predict")
-    np.testing.assert_array_equal(table(again, STATES), table(found, STATES))
+    assert_array_equal(table(again, STATES), table(found, STATES))
     assert again.attrs["status"] == found.attrs["status"]
 
 
@@ -94,7 +95,7 @@ def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift
     assert found.attrs["status"] == f"ok, input predicted from t = {since:g} s"
     same = found.time.values < since - 1e-9
     is_equal = table(found, STATES) == table(whole, STATES)
-    np.testing.assert_array_equal(is_equal, np.stack([same, same], axis=1))
+    assert_array_equal(is_equal, np.stack([same, same], axis=1))
 
 
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
@@ -116,15 +117,15 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
         assert set(windows["status"].values[0].ravel()) == {"ok"}
         assert set(windows["status"].values[1].ravel()) == {words}
     reduced = ensemble.summarize_windows(short, [10.0, START], STEPS, ahead="predict")
-    np.testing.assert_array_equal(reduced["input_predicted_from"], windows["input_predicted_from"])
+    assert_array_equal(reduced["input_predicted_from"], windows["input_predicted_from"])
     at = round((START - float(drift.time[0])) / ensemble.dt)
     x, u = table(short, STATES), table(short, INPUTS)
     given = (x[: at + 1], u[: at + 1], u[at + 1 :], STEPS)
     band = ensemble.hold().forecast_arrays(*given, ahead="predict")
-    np.testing.assert_allclose(band.mean, table(summary, STATES)[0], rtol=1e-9)
+    assert_allclose(band.mean, table(summary, STATES)[0], rtol=1e-9)
     one, every = ensemble.member(1).forecast_arrays(*given, ahead="predict"), table(members, STATES)
     # The mean of the ensemble is weighed where its waves are predicted; a member alone is not.
-    np.testing.assert_allclose(one[:-4], every[1, :-4], rtol=1e-9)
+    assert_allclose(one[:-4], every[1, :-4], rtol=1e-9)
     assert np.all(np.ptp(every[:, -1], axis=0) > 0)  # a band stays where waves are predicted
 
 
@@ -141,15 +142,15 @@ def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
     # Unweighted, it is 1.4 and stays so.
     assert ratio.max() < 1.01
     assert ratio[:3].max() < 0.2
-    np.testing.assert_allclose(found.heave.values[-20:], mean, atol=1e-12)
+    assert_allclose(found.heave.values[-20:], mean, atol=1e-12)
 
 
 def test_where_waves_are_known_nothing_is_weighed(model):
     scale, runs = model.state_scale, 9.0 * np.random.default_rng(0).standard_normal((1, 5, 4, 2))
     known = np.array([True, True, False, False])
     mean, _, weight = weighed(runs, 0.0, scale, known)
-    np.testing.assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
-    np.testing.assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
+    assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
+    assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
 
 
 @pytest.mark.parametrize("lost", [None, 0, 1])
@@ -162,14 +163,14 @@ def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     if lost is None:  # a member whose departure is lost counts with the others
         parts[1, 0, :, -1] = np.nan
         weigh_members(windows, parts, errors, scale)
-        np.testing.assert_allclose(parts[0, :, 0, :, 0].mean(axis=0), [1.0] * 3 + [0.0] * 6)
-        np.testing.assert_allclose(np.ptp(parts[0], axis=0), 8.0)
+        assert_allclose(parts[0, :, 0, :, 0].mean(axis=0), [1.0] * 3 + [0.0] * 6)
+        assert_allclose(np.ptp(parts[0], axis=0), 8.0)
         return
     parts = parts[:, :1]
     parts[lost, :, :, -1] = np.nan
     weigh_members(windows, parts, errors, scale)
     expected = [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan]
-    np.testing.assert_allclose(parts[0, 0, 0, :, 0], expected)
+    assert_allclose(parts[0, 0, 0, :, 0], expected)
 
 
 def test_errors_of_several_models_are_known_as_far_as_those_of_any():
@@ -177,15 +178,15 @@ def test_errors_of_several_models_are_known_as_far_as_those_of_any():
         LeadErrors(n * np.eye(1), np.array(x)[:, None]) for n, x in ((1, [3.0]), (3, [1, 1, 4.0]))
     ]
     both = LeadErrors.together(parts)
-    np.testing.assert_allclose(both.residual, [[2.0]])
-    np.testing.assert_allclose(both.rms[:, 0] ** 2, [5.0, 5.0, 16.0])  # and never fall
+    assert_allclose(both.residual, [[2.0]])
+    assert_allclose(both.rms[:, 0] ** 2, [5.0, 5.0, 16.0])  # and never fall
 
 
 def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
     scale = model.state_scale
     claimed = np.array([0.4, 0.6, 0.8, 0.7, 1.0])[:, None]  # squares over those of training
     weight = weighed(np.zeros((1, 1, 5, 2)), claimed * scale.spread**2, scale, np.zeros(5, bool))[2]
-    np.testing.assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
+    assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
 
 
 def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):
@@ -197,9 +198,9 @@ def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, 
     found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
     known = table(model.forecast(drift, start, steps), STATES)
     given = last - at + 1 - LEAD
-    np.testing.assert_allclose(found[:given], known[:given], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
+    assert_allclose(found[:given], known[:given], rtol=0, atol=1e-9)
+    assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
     windows = model.forecast_windows(short, [10.0, start], steps, ahead="predict")
     whole = model.forecast(drift, 10.0, steps)  # all waves of that window were measured
     both = np.stack([table(whole, STATES), found])
-    np.testing.assert_allclose(table(windows, STATES), both, rtol=0, atol=1e-9)
+    assert_allclose(table(windows, STATES), both, rtol=0, atol=1e-9)

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from free_runs import loop_score
+from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
@@ -49,7 +50,7 @@ def test_windows_are_forecasts_and_a_history_is_what_the_settings_say(kind, runs
     assert model.history_samples == spec.needs(DT).history + 1
     one = model.forecast(test, start=20.0, steps=40)
     several = model.forecast_windows(test, [20.0, 30.0], 40)
-    np.testing.assert_allclose(table(several, STATES)[0], table(one, STATES), atol=1e-10)
+    assert_allclose(table(several, STATES)[0], table(one, STATES), atol=1e-10)
 
 
 def test_mean_and_hold_last_are_what_they_say_and_read_no_input(runs):
@@ -57,10 +58,10 @@ def test_mean_and_hold_last_are_what_they_say_and_read_no_input(runs):
     model = Mean().fit(runs, STATES, INPUTS, stop=50.0)
     pooled = np.concatenate([table(run, STATES)[:501] for run in runs])
     forecast = model.forecast(test.drop_vars(INPUTS), start=20.0, steps=5)
-    np.testing.assert_allclose(table(forecast, STATES), [pooled.mean(axis=0)] * 5, rtol=1e-12)
+    assert_allclose(table(forecast, STATES), [pooled.mean(axis=0)] * 5, rtol=1e-12)
     assert "reads_input_until" not in forecast.attrs
     held = HoldLast().fit(runs, STATES, INPUTS).forecast(test.drop_vars(INPUTS), 20.0, 5)
-    np.testing.assert_allclose(table(held, STATES), [table(test, STATES)[200]] * 5, rtol=1e-12)
+    assert_allclose(table(held, STATES), [table(test, STATES)[200]] * 5, rtol=1e-12)
 
 
 def test_arx_is_least_squares():
@@ -72,7 +73,7 @@ def test_arx_is_least_squares():
         known.append(np.concatenate([embed(x, 3, 4, 595), embed(u, 4, 4, 595)]).T)
         after.append(x[5:])
     expected = np.linalg.lstsq(np.concatenate(known), np.concatenate(after))[0].T
-    np.testing.assert_allclose(model.coefficients, expected, atol=1e-9)
+    assert_allclose(model.coefficients, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["arx", "subspace"])
@@ -82,7 +83,7 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     change = {"ridge": 0.0} | ({"order": 5} if kind == "subspace" else {})
     spec = dataclasses.replace(SPECS[kind], **change)
     forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
-    np.testing.assert_allclose(table(forecast, STATES), table(test, STATES)[201:501], atol=1e-7)
+    assert_allclose(table(forecast, STATES), table(test, STATES)[201:501], atol=1e-7)
 
 
 def test_fir_finds_a_known_impulse_response():
@@ -93,7 +94,7 @@ def test_fir_finds_a_known_impulse_response():
     run = record(DT, heave=x[:, 0], pitch=x[:, 1], eta=u[:, 0])
     model = FIR(input_delays=15, ridge=0.0, standardize=False).fit(run, STATES, ["eta"])
     found = model.coefficients[:, 2:]
-    np.testing.assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
+    assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
     assert model.spectral_radius == 0.0
     with pytest.raises(RequestError, match=r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
@@ -134,7 +135,7 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
     other["heave"][:200] += 1.0
     window = dataclasses.replace(spec, window=250)
     few = [window.fit(run, STATES, INPUTS) for run in (given[0], other)]
-    np.testing.assert_array_equal(few[0].coefficients, few[1].coefficients)
+    assert_array_equal(few[0].coefficients, few[1].coefficients)
 
 
 @pytest.mark.parametrize("kind", ["fir", "arx", "subspace"])
@@ -148,7 +149,7 @@ def test_waves_that_have_not_arrived_drive_where_a_lead_is_set(kind, runs):
     found = model.forecast(late(test), start=20.0, steps=40)
     expected = plain.forecast(test, start=20.0, steps=40)
     # The last three pairs of each training run have no look-ahead left.
-    np.testing.assert_allclose(table(found, STATES), table(expected, STATES), atol=0.02)
+    assert_allclose(table(found, STATES), table(expected, STATES), atol=0.02)
     assert found.attrs["reads_input_until"] == pytest.approx(2 * DT)
 
 
@@ -166,4 +167,4 @@ def test_a_subspace_model_without_inputs_continues_the_states():
     run = record(DT, {}, heave=swing)
     model = Subspace(6, 0, order=2, ridge=0.0).fit(run, ["heave"], [], stop=19.9)
     forecast = model.forecast(run, start=25.0, steps=40)
-    np.testing.assert_allclose(forecast["heave"], swing[251:291], atol=1e-4)
+    assert_allclose(forecast["heave"], swing[251:291], atol=1e-4)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 import seakeep
@@ -49,7 +50,7 @@ def assert_kept(kept, ensemble, members):
     """Members of an ensemble are what is left, and forecast as they did."""
     run = sea(3, 300, "other")
     found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (kept, ensemble))
-    np.testing.assert_array_equal(found, every[members])
+    assert_array_equal(found, every[members])
 
 
 @of_each_scale
@@ -75,7 +76,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
     assert np.all(4 * found.floor > 1.5)  # the noise alone
     half = found.conformal.margin * np.sqrt(std**2 + found.floor**2)
     expected = [mean, mean - half, mean + half]
-    np.testing.assert_allclose(table(wide, STATES)[[0, 2, 3]], expected, rtol=0, atol=1e-12)
+    assert_allclose(table(wide, STATES)[[0, 2, 3]], expected, rtol=0, atol=1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
 
 
@@ -88,7 +89,7 @@ def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble,
     sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
     moved = table(wide, STATES) - table(plain, STATES)
     # One addition: rounding of numbers of about ten.
-    np.testing.assert_allclose(moved, sides * margin, rtol=0, atol=1e-14 * 10)
+    assert_allclose(moved, sides * margin, rtol=0, atol=1e-14 * 10)
     assert wide.attrs["band"] == "calibrated"
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
     with pytest.raises(RequestError, match=r"not calibrated"):
@@ -115,7 +116,7 @@ def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
         _, _, low, high = table(here, STATES)
         scores.append(band_scores(low, high, table(run, STATES)[at + 1 : at + 41]))
     expected = conformal_margin(np.stack(scores), 0.95)
-    np.testing.assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
+    assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
 
 
 def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(bands, run):
@@ -127,8 +128,8 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     mean, _, _, upper = found = table(one, STATES)
     assert np.all(np.ptp(upper - mean, axis=0) > 0.01 * (upper - mean).mean(axis=0))  # no constant
     # Products of matrices of other sizes: other roundings.
-    np.testing.assert_allclose(table(several, STATES)[1], found, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(arrays.upper, upper, atol=1e-9)
+    assert_allclose(table(several, STATES)[1], found, rtol=0, atol=1e-9)
+    assert_allclose(arrays.upper, upper, atol=1e-9)
     assert "learnt from the members' spread" in one["statistic"].attrs["comment"]
     assert "times a learnt scale and a floor of" in learnt.summary()
 
@@ -148,8 +149,8 @@ def pooled(train_on, runs, window=None):
 def assert_learnt(found, judged):
     """Margin and floor are those of errors that were judged by hand."""
     expected, floor, _ = learn_margin(judged, 0.95, "spread")
-    np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
-    np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
+    assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
+    assert_allclose(found.floor, floor, rtol=1e-9)
 
 
 def test_folds_are_forecast_by_what_the_other_runs_teach():
@@ -174,7 +175,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
     # A run that none has read is forecast by all.
     other = {"other": sea(3, 500, "other")}
     one, two = (ensemble.calibrate(other, 40, folds=folds).calibration for folds in ("run", None))
-    np.testing.assert_array_equal(one.conformal.margin, two.conformal.margin)
+    assert_array_equal(one.conformal.margin, two.conformal.margin)
 
 
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():

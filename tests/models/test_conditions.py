@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drifting import drifting_run
+from numpy.testing import assert_allclose
 from records import record
 from scipy import signal
 
@@ -54,7 +55,7 @@ def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reaso
     assert (each.reason, each.channel) == (reason, channel)
     assert each.own < 0.8 * each.pooled
     # Estimated from a minute of free runs, by a model of noisy data.
-    np.testing.assert_allclose(each.value, value, rtol=0.1)
+    assert_allclose(each.value, value, rtol=0.1)
     assert "odd disagrees with the other runs: " in each.describe()
     assert ("set centre = 'run' in [model]" in each.describe()) == (reason == "offset")
     # These runs state no water depth.
@@ -69,7 +70,7 @@ def test_another_unit_of_a_load_moves_its_mean_too():
     runs["odd"] = runs["odd"].assign(heave=(runs["odd"]["heave"] / 9.81).assign_attrs(units="m"))
     (each,) = disagreements(SPEC, runs, *CHANNELS)
     assert (each.run, each.reason, each.channel) == ("odd", "scale", "heave")
-    np.testing.assert_allclose(each.value, 1 / 9.81, rtol=0.1)
+    assert_allclose(each.value, 1 / 9.81, rtol=0.1)
 
 
 def test_of_two_runs_either_may_be_wrong():
@@ -87,7 +88,7 @@ def test_an_offset_is_named_also_for_a_model_with_a_memory():
     (each,) = found({"offset": offset}, replace(SPEC, memory=100))
     assert (each.run, each.reason, each.channel) == ("odd", "offset", "heave")
     # Estimated from a minute of free runs, by a model of noisy data.
-    np.testing.assert_allclose(each.value, offset, rtol=0.1)
+    assert_allclose(each.value, offset, rtol=0.1)
 
 
 def test_a_probe_that_was_moved_is_found_with_its_distance():

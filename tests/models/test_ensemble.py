@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
+from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 from scipy import stats
 
@@ -73,26 +74,26 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     assert np.abs(moved).max() > 1e-3
     wanted = [mean + moved, std, lower + moved, upper + moved]
     for found in (*(table(each, STATES) for each in ways), from_arrays[:4]):
-        np.testing.assert_allclose(found, wanted, **close)
-    np.testing.assert_allclose(served[0], expected, **close)
+        assert_allclose(found, wanted, **close)
+    assert_allclose(served[0], expected, **close)
     assert np.all(served[1] > alone_served[1])  # the members' spread comes on top
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
     both = {name: runs[name] for name in "ac"}
     two = dataclasses.replace(settings, window=None).fit(both, STATES, INPUTS)
     expected_left = table(two.forecast(unseen, 65.0, 120), STATES)
-    np.testing.assert_allclose(table(left, STATES)[0], expected_left, **close)
+    assert_allclose(table(left, STATES)[0], expected_left, **close)
     band = centred.calibrate(wave_run(9), 100, 0.9).forecast_summary(
         unseen, 65.0, 100, 0.9, band="calibrated"
     )
     _, _, lower, upper = table(band, STATES)
-    np.testing.assert_allclose(0.5 * (lower + upper), expected[:100], **close)
+    assert_allclose(0.5 * (lower + upper), expected[:100], **close)
 
 
 def test_draws_are_rounded_to_the_nearest_sample(run):
     draws = fitted(run).draws
     for name in ("window", "state_delays", "input_delays"):
         expected = np.floor(draws[name] * PERIOD / DT + 0.5)
-        np.testing.assert_array_equal(draws[f"{name}_samples"], expected)
+        assert_array_equal(draws[f"{name}_samples"], expected)
     assert draws.window.min() >= 8
     assert draws.window.max() <= 14
     assert draws.sizes == {"member": 6}
@@ -146,13 +147,13 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
     members = ensemble.forecast(run, start=65.0, steps=77)
     expected, values = seakeep.summarize(members, level=0.9), table(members, STATES)
     _, std, lower, _ = table(expected, STATES)
-    np.testing.assert_allclose(lower, np.quantile(values, 0.05, axis=0), rtol=1e-12)
-    np.testing.assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
+    assert_allclose(lower, np.quantile(values, 0.05, axis=0), rtol=1e-12)
+    assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
     for held, chunk in ((2**25, 2**23), (0, 1500)):
         monkeypatch.setattr(engine, "HELD", held)
         monkeypatch.setattr(forecasts, "CHUNK", chunk)
         found = ensemble.forecast_summary(run, start=65.0, steps=77, level=0.9)
-        np.testing.assert_array_equal(table(found, STATES), table(expected, STATES))
+        assert_array_equal(table(found, STATES), table(expected, STATES))
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
 
 
@@ -165,10 +166,10 @@ def test_windows_side_by_side_equal_single_forecasts(run):
         single = ensemble.forecast(run, start=start, steps=60)
         # Two windows are one product: other roundings.
         found = table(together, STATES)[window]
-        np.testing.assert_allclose(found, table(single, STATES), atol=1e-10)
+        assert_allclose(found, table(single, STATES), atol=1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
     expected = seakeep.summarize(together)
-    np.testing.assert_array_equal(table(summary, STATES), table(expected, STATES))
+    assert_array_equal(table(summary, STATES), table(expected, STATES))
 
 
 def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
@@ -185,7 +186,7 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     assert draws.last_sample.max() <= 600
     last = float(run.time[int(draws.last_sample[1])])
     expected = HankelDMDc(8, 16, 1.0, window=160).fit(run, STATES, INPUTS, stop=last)
-    np.testing.assert_allclose(ensemble.member(1).A, expected.A, atol=1e-10)
+    assert_allclose(ensemble.member(1).A, expected.A, atol=1e-10)
     assert ensemble.member(1).training.stop == pytest.approx((last,))
     shortest = run.isel(time=slice(0, 160 + 16))  # which leaves one place for the window
     found = small(train_on="windows", **fixed).fit(shortest, STATES, INPUTS)
@@ -209,7 +210,7 @@ def test_members_that_diverge_say_when():
     gone = forecast.time.values[np.isnan(forecast.heave).values.argmax(axis=1)]
     said = [float(text.split()[4]) for text in forecast.status.values[lost]]
     assert said == pytest.approx(gone[lost], abs=5e-3)  # as many digits as the step asks
-    np.testing.assert_array_equal(summary.status, forecast.status)
+    assert_array_equal(summary.status, forecast.status)
     assert summary.attrs["diverged"] == forecast.attrs["diverged"] == lost.sum()
     assert forecast.attrs["status"] == f"{lost.sum()} of 10 members diverged"
     with pytest.warns(
@@ -228,7 +229,7 @@ def test_spectral_radii_are_those_of_the_members(run):
     found = ensemble.spectral_radii(
         executor=ThreadPoolExecutor(2), progress=lambda *step: told.append(step)
     )
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert_allclose(found, expected, rtol=1e-12)
     assert told == [(k, 6, f"member {k}") for k in range(1, 7)]
 
 
@@ -255,7 +256,7 @@ def test_forecasts_carry_the_spread_that_tells_a_slack_channel(run):
         ensemble.summarize_windows(run, [65.0], 5),
     ):
         found = [forecast[name].attrs["training_std"] for name in STATES]
-        np.testing.assert_allclose(found, pooled, rtol=1e-13)  # the order of a sum
+        assert_allclose(found, pooled, rtol=1e-13)  # the order of a sum
 
 
 def test_draws_are_quantiles_of_any_distribution_of_scipy(run):

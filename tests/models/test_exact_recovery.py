@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from oscillators import Oscillator
 
 from seakeep import HankelDMDc
@@ -21,9 +22,9 @@ def top_row(model):
 def test_a_position_only_oscillator_gives_its_arx_coefficients(delay_rows):
     spec = HankelDMDc(1, 1, 0.0, standardize=False, delay_rows=delay_rows)
     model = spec.fit(VESSEL.run(), **FORCED)
-    np.testing.assert_allclose(top_row(model), VESSEL.arx, rtol=0, atol=EXACT)
-    np.testing.assert_allclose(model.A[1], [1, 0], rtol=0, atol=EXACT)
-    np.testing.assert_allclose(model.B[1], [0, 0], rtol=0, atol=EXACT)
+    assert_allclose(top_row(model), VESSEL.arx, rtol=0, atol=EXACT)
+    assert_allclose(model.A[1], [1, 0], rtol=0, atol=EXACT)
+    assert_allclose(model.B[1], [0, 0], rtol=0, atol=EXACT)
 
 
 @pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
@@ -36,7 +37,7 @@ def test_with_redundant_delays_forecasts_are_right(s, z, delay_rows):
     model = HankelDMDc(s, z, 0.0, standardize=False, delay_rows=delay_rows).fit(run, **FORCED)
     other = VESSEL.run(seed=1)
     forecast = model.forecast(other, start=float(other.time[10]), steps=150)
-    np.testing.assert_allclose(forecast.heave, other.heave[11:161], rtol=0, atol=EXACT)
+    assert_allclose(forecast.heave, other.heave[11:161], rtol=0, atol=EXACT)
 
 
 def test_no_snapshot_pair_crosses_a_joint():
@@ -46,5 +47,5 @@ def test_no_snapshot_pair_crosses_a_joint():
     assert np.max(np.abs(top_row(spec.fit(runs[0], **FORCED)) - VESSEL.arx)) > 1e-3
     pooled = spec.fit({"a": runs[0], "b": runs[1], "c": runs[2]}, **FORCED)
     # Six columns of random data: the condition number may reach 1e4, so 1e-12 and a margin.
-    np.testing.assert_allclose(top_row(pooled), VESSEL.arx, rtol=0, atol=EXACT)
+    assert_allclose(top_row(pooled), VESSEL.arx, rtol=0, atol=EXACT)
     assert pooled.training.runs == ("a", "b", "c")

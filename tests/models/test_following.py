@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drifting import FOLLOWED, INPUTS, STATES, heave_error
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, Powers, SlowSquares
@@ -53,7 +54,7 @@ def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
 
 def test_a_ridge_weighs_a_hundred_times_on_powers(models):
     scale = models["ahead"].signature.input_scale
-    np.testing.assert_allclose(scale.std / scale.spread, [1, 1, 10, 10, 10, 10])  # √100
+    assert_allclose(scale.std / scale.spread, [1, 1, 10, 10, 10, 10])  # √100
 
 
 def test_training_is_the_recursion_on_the_measured_surge(models, drift):
@@ -65,10 +66,10 @@ def test_training_is_the_recursion_on_the_measured_surge(models, drift):
         for each in (surge, later)
     ]
     found, other = (drive.rows(500, 600) for drive in drives)
-    np.testing.assert_array_equal(other.delayed[:60], found.delayed[:60])
+    assert_array_equal(other.delayed[:60], found.delayed[:60])
     assert not np.allclose(other.delayed[60:], found.delayed[60:])
     away = drives[0].places(500, 600) - input_map.follows.place.centre
-    np.testing.assert_array_equal(found.direct[:, -1], away**2)
+    assert_array_equal(found.direct[:, -1], away**2)
 
 
 def test_a_step_is_the_equation():
@@ -112,10 +113,10 @@ def test_a_step_is_the_equation():
             alone = run(slice(model, model + 1), slice(window, window + 1), forcing)
             one = [each[0, 0] for each in alone]
             for states, inputs in ((found[model, window], used[model, window]), one):
-                np.testing.assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
-                np.testing.assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
+                assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
+                assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
     lost = np.where(np.arange(steps)[:, None] < 20, forcing, np.nan)
     for of in (slice(1), slice(3)):  # a run that is lost stays so, and keeps a place
         one, driven = run(of, slice(1), lost)
-        np.testing.assert_array_equal(np.isnan(one), np.isnan(lost[of, :1]))
+        assert_array_equal(np.isnan(one), np.isnan(lost[of, :1]))
         assert np.isfinite(driven).all()

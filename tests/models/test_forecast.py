@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc
@@ -33,8 +34,8 @@ def test_states_are_read_up_to_the_start_and_inputs_up_to_the_last_instant_but_o
         expected.append(state[:2] * model.state_std + model.state_mean)
     forecast = model.forecast(test_run, start=k * DT, steps=40)
     # The same recursion with sums in another order.
-    np.testing.assert_allclose(table(forecast, model.states), expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(forecast.time, test_run.time[k + 1 : k + 41], rtol=0, atol=0)
+    assert_allclose(table(forecast, model.states), expected, rtol=0, atol=1e-12)
+    assert_allclose(forecast.time, test_run.time[k + 1 : k + 41], rtol=0, atol=0)
 
 
 @pytest.mark.parametrize(("s", "z"), [(3, 8), (8, 3)])
@@ -66,7 +67,7 @@ def test_channels_time_and_units_are_kept(model, test_run):
 
 def test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it(model, test_run):
     within = model.forecast(test_run, start=5.0)
-    np.testing.assert_array_equal(within.time, test_run.time[101:])
+    assert_array_equal(within.time, test_run.time[101:])
     past = model.forecast(test_run, start=5.0, steps=200)  # its inputs are there
     xr.testing.assert_equal(past.isel(time=slice(0, 199)), within)
     assert float(past.time[-1]) == pytest.approx(300 * DT)

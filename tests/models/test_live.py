@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from drifting import FOLLOWED, INPUTS, SQUARES, STATES
 from ensembles import few
+from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -82,22 +83,22 @@ def test_fed_with_everything_it_is_the_forecast(models, drift, key):
     found = driven(live, drift)
     expected = model.forecast(drift, start=float(drift.time[START - 1]), steps=STEPS)
     # The same numbers go through the same products; an instant differs by the rounding of its sum.
-    np.testing.assert_array_equal(mean(found), table(expected, STATES))
-    np.testing.assert_array_equal(live.state, table(drift, STATES)[START - 1])
+    assert_array_equal(mean(found), table(expected, STATES))
+    assert_array_equal(live.state, table(drift, STATES)[START - 1])
     assert not live.covariance.any()
     play(live, drift, START, START + max(model.signature.lead_samples, 1))  # and then it is final
     surprise = table(drift, STATES)[START] - table(expected, STATES)[0]
     # One-step predictions in physical units, and the forecast in deviations: rounding.
-    np.testing.assert_allclose(live.innovation, surprise, rtol=0, atol=1e-9)
+    assert_allclose(live.innovation, surprise, rtol=0, atol=1e-9)
 
 
 def test_members_that_are_held_give_the_mean_of_the_ensemble(ensemble, drift):
     live = started(ensemble.hold(), drift)
     found = driven(live, drift)
     expected = ensemble.forecast_summary(drift, float(drift.time[START - 1]), STEPS)
-    np.testing.assert_array_equal(mean(found), mean(expected))
+    assert_array_equal(mean(found), mean(expected))
     both = np.hypot(std(expected), live.errors.at(np.arange(1, STEPS + 1)))
-    np.testing.assert_allclose(std(found), both, rtol=1e-9)
+    assert_allclose(std(found), both, rtol=1e-9)
 
 
 def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(models, drift):
@@ -108,12 +109,12 @@ def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(mo
         at = START + since - 1
         (estimate,) = play(live, drift, at, at + 1, lost=[at])
         # One-step predictions in physical units, and the forecast in deviations: rounding adds up.
-        np.testing.assert_allclose(estimate, expected[since - 1], rtol=0, atol=1e-9)
+        assert_allclose(estimate, expected[since - 1], rtol=0, atol=1e-9)
         deviation = np.sqrt(np.diagonal(live.covariance))
-        np.testing.assert_allclose(deviation, model.errors.at(since), rtol=1e-9)
+        assert_allclose(deviation, model.errors.at(since), rtol=1e-9)
     found = live.forecast(10, table(drift, INPUTS)[START + lost :])
     limit = model.errors.at(lost + np.arange(1, 11))
-    np.testing.assert_allclose(std(found), limit, rtol=1e-9)
+    assert_allclose(std(found), limit, rtol=1e-9)
 
 
 def test_errors_are_those_of_data_that_were_not_trained_on():
@@ -132,19 +133,19 @@ def test_a_dead_sensor_is_followed_through_the_others(models, drift):
     live = started(model, drift)
     found = play(live, drift, START, START + steps, dead=["heave"])
     truth = table(drift, STATES)[START : START + steps]
-    np.testing.assert_array_equal(found[:, 0], truth[:, 0])
-    np.testing.assert_array_equal(np.isnan(live.innovation), [False, True])
+    assert_array_equal(found[:, 0], truth[:, 0])
+    assert_array_equal(np.isnan(live.innovation), [False, True])
     deviation = np.sqrt(live.covariance[1, 1])
     assert 0 < deviation <= model.errors.at(steps)[1]
     assert np.sqrt(np.mean((found[:, 1] - truth[:, 1]) ** 2)) < 3 * deviation
     forecast = live.forecast(STEPS, table(drift, INPUTS)[START + steps :])
     own, bound = (model.errors.of_forecast(STEPS, since) for since in (0, steps))
     carried = np.minimum(own + live._filter.ahead(STEPS), bound)
-    np.testing.assert_allclose(std(forecast) ** 2, carried, rtol=1e-9)
+    assert_allclose(std(forecast) ** 2, carried, rtol=1e-9)
     assert np.any(carried > 1.1 * own)
     assert np.any(carried < 0.9 * bound)
     again = play(live, drift, START + steps, START + steps + 5)
-    np.testing.assert_array_equal(again[-1], table(drift, STATES)[START + steps + 4])
+    assert_array_equal(again[-1], table(drift, STATES)[START + steps + 4])
     assert not live.covariance.any()
 
 
@@ -185,9 +186,9 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     # 256 squares of a normal number have a mean of 1 ± 0.09 (SD); those of free runs, which are
     # alike within some dozens of samples, of 1 ± 0.4.
     assert found[0.0][0] == pytest.approx(1.0, abs=0.3)
-    np.testing.assert_allclose(found[0.0][1][0], 1.0, atol=0.3)
+    assert_allclose(found[0.0][1][0], 1.0, atol=0.3)
     assert np.all((found[0.0][1][1] > 0.2) & (found[0.0][1][1] < 2.2))
-    np.testing.assert_allclose(found[0.7][1][0], [1.49, 1.0], atol=0.4)
+    assert_allclose(found[0.7][1][0], [1.49, 1.0], atol=0.4)
     # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
     sway, heave = found[0.7][1][1]
     assert sway > 5 > 2.2 > heave > 0.2
@@ -213,10 +214,10 @@ def test_what_samples_tell_does_not_depend_on_when_it_is_read(models, drift, key
         play(late, drift, at, at + 1, dead=dead)
         play(often, drift, at, at + 1, dead=dead)
         assert np.isfinite(often.consistency)
-        np.testing.assert_array_equal(late.state, often.state)
+        assert_array_equal(late.state, often.state)
     # Sums of rows that are read one by one, or together: rounding.
-    np.testing.assert_allclose(late.consistency_by_state, often.consistency_by_state, rtol=1e-9)
-    np.testing.assert_allclose(late.innovation, often.innovation, rtol=0, atol=1e-12)
+    assert_allclose(late.consistency_by_state, often.consistency_by_state, rtol=1e-9)
+    assert_allclose(late.innovation, often.innovation, rtol=0, atol=1e-12)
 
 
 def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkeypatch):
@@ -234,11 +235,11 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     waves = table(higher, INPUTS)[:START]
     waves = waves - waves.mean(axis=0)
     heights = 4 * np.sqrt(np.mean(waves**4, axis=0) / (3 * np.mean(waves**2, axis=0)))
-    np.testing.assert_allclose(made.attrs["height"], heights, rtol=1e-12)
+    assert_allclose(made.attrs["height"], heights, rtol=1e-12)
     ratio = np.max(heights / made.attrs["trained_height"])
     of_late = np.maximum(live.consistency_by_state.max(axis=0), ratio**2)
     # Beside the rounding, nothing but the two reasons widens the band.
-    np.testing.assert_allclose(stds[1], np.sqrt(of_late) * stds[0], rtol=1e-12)
+    assert_allclose(stds[1], np.sqrt(of_late) * stds[0], rtol=1e-12)
     assert ratio > 1.3
     drifted = model.live()
     play(drifted, drift.assign(surge=drift.surge + 5), 0, START)
@@ -248,7 +249,7 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, len(STATES))))
     made = driven(live, higher)
     expected = ratio * model.errors.at(np.arange(STEPS) + 1)
-    np.testing.assert_allclose(std(made), expected, rtol=1e-12)
+    assert_allclose(std(made), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("value", [9.97e36, 1e200])
@@ -270,14 +271,14 @@ def test_waves_that_are_not_known_widen_the_band(models, drift):
     assert (known.attrs["known_input"], part.attrs["known_input"]) == (STEPS + 5, 20)
     assert unknown.attrs["known_input"] == 0
     least, more, most = map(std, (known, part, unknown))
-    np.testing.assert_allclose(more[:14], least[:14], rtol=1e-6)
+    assert_allclose(more[:14], least[:14], rtol=1e-6)
     assert np.all(most[6:20] > more[6:20])
     assert np.all(np.minimum(more, most)[-20:] > least[-20:])
     for name in STATES:
         leads = [each[name].attrs["lead_time"] for each in (unknown, part, known)]
         assert leads == sorted(leads)
     width = mean(known, "upper") - mean(known, "lower")
-    np.testing.assert_allclose(width, 2 * stats.t.ppf(0.975, 48) * least, rtol=1e-6)
+    assert_allclose(width, 2 * stats.t.ppf(0.975, 48) * least, rtol=1e-6)
 
 
 def test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known(models, drift, monkeypatch):
@@ -285,7 +286,7 @@ def test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known(models, d
     calm = live.forecast(STEPS)
     monkeypatch.setattr(type(live), "consistency_by_state", np.full((2, len(STATES)), 30.0))
     widened = live.forecast(STEPS)
-    np.testing.assert_array_equal(mean(widened), mean(calm))
+    assert_array_equal(mean(widened), mean(calm))
     assert np.all(widened.heave.sel(statistic="std") > calm.heave.sel(statistic="std"))
 
 
@@ -298,11 +299,11 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, ensemble,
             expected = expected.mean("member")
         live = started(model, cut)
         found = live.forecast(steps)
-        np.testing.assert_allclose(mean(found), table(expected, STATES), rtol=0, atol=1e-9)
+        assert_allclose(mean(found), table(expected, STATES), rtol=0, atol=1e-9)
         # By then all weight is on the mean of training, which errs by the SD there.
         scale = model.signature.state_scale
-        np.testing.assert_allclose(mean(found)[-1, 1], scale.centre[1], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(std(found)[-20:, 1], scale.spread[1], rtol=1e-9)
+        assert_allclose(mean(found)[-1, 1], scale.centre[1], rtol=0, atol=1e-9)
+        assert_allclose(std(found)[-20:, 1], scale.spread[1], rtol=1e-9)
 
 
 def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models, drift):
@@ -340,13 +341,13 @@ def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, tmp_pa
     path = live.save(tmp_path / "state.nc")
     found = live.forecast(STEPS - count)
     again = load_live(models[key], path).forecast(STEPS - count)
-    np.testing.assert_array_equal(mean(again), mean(found))
+    assert_array_equal(mean(again), mean(found))
     assert not live.validity & Validity.LOST  # the band holds what is not known
     assert found.attrs["known_input"] == 0
     for each in ("mean", "std"):
         # What is predicted from is the same, but for the oldest samples of a full record.
         expected = mean(before, each)[count:]
-        np.testing.assert_allclose(mean(found, each), expected, rtol=0, atol=2e-3)
+        assert_allclose(mean(found, each), expected, rtol=0, atol=2e-3)
     play(live, drift, START + count, START + count + 8)
     assert live.validity & Validity.LOST  # thirty samples are no gap that is closed
     play(live, drift, START + count + 8, START + count + models[key].history_samples)
@@ -354,7 +355,7 @@ def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, tmp_pa
     for _ in range(len(live.errors.rms) + 1):
         live.step()
     found, scale = live.forecast(2), models[key].signature.state_scale
-    np.testing.assert_allclose(mean(found), [scale.centre] * 2, rtol=1e-12)
+    assert_allclose(mean(found), [scale.centre] * 2, rtol=1e-12)
     assert np.all(std(found) > 0.999 * scale.spread)
 
 
@@ -378,7 +379,7 @@ def test_forecasts_read_waves_whose_short_gaps_are_closed(models, drift, monkeyp
     monkeypatch.setattr(live, "_foreseen", lambda of, count: seen.append(of) or foresee(of, count))
     live.forecast(5)
     assert np.square(seen[0] - waves)[lost].mean() < 0.1 * filled
-    np.testing.assert_array_equal(seen[0][~lost], waves[~lost])
+    assert_array_equal(seen[0][~lost], waves[~lost])
 
 
 def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift):
@@ -411,9 +412,9 @@ def test_skill_against_lead_time_is_that_of_forecasts_by_hand(models, drift):
         squares = ((mean(forecast) - measured) / spread) ** 2, (std(forecast) / spread) ** 2
         judged.append(np.where(np.isfinite(measured), [*squares, 100.0 * held], np.nan))
     squares, claimed, inside = np.nanmean(judged, axis=0)
-    np.testing.assert_allclose(found.error, np.sqrt(squares), rtol=1e-12)
-    np.testing.assert_allclose(found.claimed, np.sqrt(claimed), rtol=1e-12)
-    np.testing.assert_array_equal(found.coverage, inside)
+    assert_allclose(found.error, np.sqrt(squares), rtol=1e-12)
+    assert_allclose(found.claimed, np.sqrt(claimed), rtol=1e-12)
+    assert_array_equal(found.coverage, inside)
 
 
 def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(models, drift):
@@ -421,7 +422,7 @@ def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(models
     play(live, drift, 0, START)
     live.step({INPUTS[0]: measured[START, 0]}, table(drift, STATES)[START])
     expected = [measured[START, 0], predict_waves(measured[:START], 1)[0, 1]]
-    np.testing.assert_array_equal(live._known_inputs()[-1], expected)
+    assert_array_equal(live._known_inputs()[-1], expected)
 
 
 def test_a_step_and_a_forecast_run_on_one_thread(models, drift):
@@ -458,14 +459,14 @@ def test_a_restarted_process_goes_on_bit_for_bit(models, drift, tmp_path, key):
         if at == START + 5:
             live.step()
         again = load_live(models[key], live.save(path))
-        np.testing.assert_array_equal(again.consistency_by_state, live.consistency_by_state)
+        assert_array_equal(again.consistency_by_state, live.consistency_by_state)
     for each in (live, again):
         play(each, drift, START + 20, START + 40, lost=[START + 23])
     for name in ("state", "covariance", "innovation", "time", "consistency_by_state"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(live, name))
+        assert_array_equal(getattr(again, name), getattr(live, name))
     assert again.consistency == live.consistency
     assert again.conditions.surge == live.conditions.surge
-    np.testing.assert_array_equal(mean(again.forecast(20)), mean(live.forecast(20)))
+    assert_array_equal(mean(again.forecast(20)), mean(live.forecast(20)))
     with pytest.raises(RequestError, match="is the state of another model"):
         load_live(models["lead"], path)
 
@@ -485,11 +486,11 @@ def test_a_state_without_measurements_is_small_and_goes_on_bit_for_bit(
         if begin == START:
             assert path.stat().st_size < 1.05 * whole  # the head's numbers grow
         again = load_live(model, path)
-        np.testing.assert_array_equal(again._filter.covariance, live._filter.covariance)
+        assert_array_equal(again._filter.covariance, live._filter.covariance)
     for each in (live, again):
         play(each, drift, 100, 110, dead=["heave"])
-    np.testing.assert_array_equal(again.state, live.state)
-    np.testing.assert_array_equal(again.covariance, live.covariance)
+    assert_array_equal(again.state, live.state)
+    assert_array_equal(again.covariance, live.covariance)
 
 
 def test_what_is_kept_does_not_grow_and_does_not_count(models, drift, tmp_path):
@@ -529,7 +530,7 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, drift, message):
         live.step(**good | BAD[message])
     for each in (live, untouched):
         each.step(**good)
-    np.testing.assert_array_equal(live.state, untouched.state)
+    assert_array_equal(live.state, untouched.state)
     assert live.consistency == untouched.consistency
 
 
@@ -564,7 +565,7 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     for statistic in ("mean", "lower", "upper"):
         both = [each.surge.sel(statistic=statistic) for each in (still, moved)]
         # The ridge moves the answer by a millionth.
-        np.testing.assert_allclose(both[1] - both[0], answer, rtol=0, atol=1e-5)
+        assert_allclose(both[1] - both[0], answer, rtol=0, atol=1e-5)
     with pytest.raises(RequestError, match=r"'thrust' is a known input, and future gives 3 of"):
         live.forecast(steps, {"thrust": plan[:3]})
     with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
@@ -574,7 +575,7 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     known[:, 1] = u[299, 1]
     expected = model.forecast_arrays(y[:300], u[:300], known, steps)
     given = constant.forecast(steps, {"eta": u[300:340, 0]})
-    np.testing.assert_allclose(given.surge.sel(statistic="mean"), expected[:, 0], atol=1e-12)
+    assert_allclose(given.surge.sel(statistic="mean"), expected[:, 0], atol=1e-12)
     assert given.attrs["known_input"] == 39
 
 
@@ -592,4 +593,4 @@ def test_the_jacobian_is_the_derivative_of_a_forecast(models, drift):
 
     derivatives = model.jacobian(x, u)
     along = sum(np.tensordot(d, c, 2) for d, c in zip(derivatives, change, strict=True))
-    np.testing.assert_allclose(along, 0.5 * (after(1) - after(-1)), rtol=1e-4, atol=1e-9)
+    assert_allclose(along, 0.5 * (after(1) - after(-1)), rtol=1e-4, atol=1e-9)

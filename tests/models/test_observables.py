@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drifting import DT, INPUTS
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep.core.observables import slow_kernel, slow_squares
@@ -70,9 +71,9 @@ def test_columns_are_named_with_units_and_stand_in_two_groups(drift):
 
 def test_the_lead_shifts_the_inputs_and_not_the_squares(drift):
     ahead, plain = (rows(fitted(drift, lead=lead), drift, 200, 300) for lead in (12, 0))
-    np.testing.assert_array_equal(ahead.delayed[:, 0], drift["eta_fwd"].values[212:312])
+    assert_array_equal(ahead.delayed[:, 0], drift["eta_fwd"].values[212:312])
     # The same sums, started at another sample of the convolution.
-    np.testing.assert_allclose(ahead.direct, plain.direct, rtol=1e-10)
+    assert_allclose(ahead.direct, plain.direct, rtol=1e-10)
     assert np.isfinite(ahead.direct).all()
 
 
@@ -82,8 +83,8 @@ def test_powers_grow_like_the_input_far_out(drift):
     u = sigma * np.array([0.01, 2.0, 60.0])
     found = chain.observed.with_delayed(np.stack([0 * u, u], axis=1))[:, 2:]
     expected = np.stack([u**q / (1 + u**2 / (36 * sigma**2)) ** ((q - 1) / 2) for q in (2, 3)], 1)
-    np.testing.assert_allclose(found, expected, rtol=1e-12)  # rounding
-    np.testing.assert_allclose(found[2] / u[2], [6 * sigma, 36 * sigma**2], rtol=0.01)  # 36/60²
+    assert_allclose(found, expected, rtol=1e-12)  # rounding
+    assert_allclose(found[2] / u[2], [6 * sigma, 36 * sigma**2], rtol=0.01)  # 36/60²
 
 
 def test_slow_squares_above_those_of_training_grow_by_seven_tenths(drift):
@@ -93,5 +94,5 @@ def test_slow_squares_above_those_of_training_grow_by_seven_tenths(drift):
     top = np.nanmax(inside)
     twice = chain.observed.direct(np.sqrt(2.0) * waves)[:, 0]
     expected = np.where(2 * inside > top, top + 0.7 * (2 * inside - top), 2 * inside)
-    np.testing.assert_allclose(twice, expected, rtol=1e-12)
+    assert_allclose(twice, expected, rtol=1e-12)
     assert (2 * inside > top).any()

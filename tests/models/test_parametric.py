@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 from scipy import signal
 
@@ -59,20 +60,20 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     run = vessel(0.7, 3)
     at = model.at(parameter=0.7)
     # Exact data: λ is the rounding of the Gram matrix, 1e-13 of its largest entry.
-    np.testing.assert_allclose(at.A[0], ON_STATE[0] + 0.7 * ON_STATE[1], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(at.B[0], [ON_WAVE[0] + 0.7 * ON_WAVE[1]], rtol=0, atol=1e-8)
+    assert_allclose(at.A[0], ON_STATE[0] + 0.7 * ON_STATE[1], rtol=0, atol=1e-8)
+    assert_allclose(at.B[0], [ON_WAVE[0] + 0.7 * ON_WAVE[1]], rtol=0, atol=1e-8)
     forecast = model.forecast(run, start=5.0, steps=200)
-    np.testing.assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-6)
+    assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-6)
     again = load_model(model.save(tmp_path / "model.nc"))
     xr.testing.assert_identical(again.forecast(run, start=5.0, steps=200), forecast)
     assert "parameter     rig.draught, trained from 0 to 1" in again.summary()
     # Its errors are those at each value, and of the file too.
-    np.testing.assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
+    assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
     served = [each.at(parameter=0.7).live().errors for each in (model, again)]
-    np.testing.assert_array_equal(served[0].rms, served[1].rms)
+    assert_array_equal(served[0].rms, served[1].rms)
     x, u = table(run, ["heave"]), table(run, ["eta"])
     arrays = at.forecast_arrays(x[:51], u[:51], u[51:251], 200)
-    np.testing.assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
+    assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
 
 
 def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
@@ -86,7 +87,7 @@ def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
     for eta, heave in zip(run.eta.values, run.heave.values, strict=True):
         live.step([eta], [heave])
     served = live.forecast(50).heave.sel(statistic="mean")
-    np.testing.assert_allclose(served, forecast.heave, rtol=0, atol=1e-9)
+    assert_allclose(served, forecast.heave, rtol=0, atol=1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):
@@ -97,7 +98,7 @@ def test_windows_of_several_runs_take_the_value_of_each(model):
     for (name, start), values in zip(places, together, strict=True):
         alone = model.forecast(runs[name], start, 50)
         # Windows side by side are summed in another order.
-        np.testing.assert_allclose(values[:, 0], alone.heave, rtol=0, atol=1e-12)
+        assert_allclose(values[:, 0], alone.heave, rtol=0, atol=1e-12)
 
 
 def test_means_follow_the_parameter():

@@ -11,6 +11,7 @@ from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
 from moored import INPUTS as ETA
 from moored import STATES as MOORED
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, RequestError
@@ -74,9 +75,7 @@ def test_the_wave_at_the_line_is_that_of_the_tank(chosen, drift):
     assert np.count_nonzero(above) > 50
     height = wave[above] - wet[above]  # half a standard deviation, less errors of carriers
     assert height.std() < 0.1 * wave.std()
-    np.testing.assert_allclose(
-        rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), atol=0.05 * rate.std()
-    )
+    assert_allclose(rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), atol=0.05 * rate.std())
 
 
 def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
@@ -131,9 +130,7 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
     # The 0.002 quantile of normal noise lies 2.9 standard deviations below.
     assert FLOOR - 3 * NOISE < stern.floor < FLOOR
     assert f"mooring_stern: none, floor {stern.floor:.4g} N" in model.summary()
-    np.testing.assert_array_equal(
-        load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor)
-    )
+    assert_array_equal(load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor))
     xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
     taut = moored(spec, slack=False)
     assert not any(each.acts for each in taut.signature.readouts)
@@ -182,7 +179,7 @@ def test_a_training_window_is_all_that_is_read(runs):
         spec.fit(each, STATES, INPUTS).signature.readouts[0].load.weights for each in (runs, late)
     ]
     # BLAS sums in an order that follows the memory: 5e-14 under the kernels of Nehalem.
-    np.testing.assert_allclose(*weights, rtol=1e-11)
+    assert_allclose(*weights, rtol=1e-11)
 
 
 def test_settings_that_are_tuned_hold_the_kinds_that_were_chosen(runs):

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from squared import DT, INPUTS, PERIOD, STATES, runs, sea
 
 from seakeep import (
@@ -43,7 +44,7 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what(tmp_path):
     assert (again.settings, again.selection) == (settings, model.selection)
     # The settings that were chosen give the same model again.
     same = settings.fit(runs(), STATES, INPUTS)
-    np.testing.assert_array_equal(same.coefficients, model.coefficients)
+    assert_array_equal(same.coefficients, model.coefficients)
     assert model.history_samples <= SPEC.needs(DT).history + 1
     assert model.lead_samples <= SPEC.needs(DT).lead
 
@@ -59,7 +60,7 @@ def test_an_ensemble_draws_around_what_was_chosen(tmp_path):
     assert np.all((ratio >= 0.3) & (ratio <= 3))
     assert len(set(ratio)) == 8
     assert ensemble.settings.lead == single.settings.lead == 8
-    np.testing.assert_array_equal(  # what a worker gets
+    assert_array_equal(  # what a worker gets
         pickle.loads(pickle.dumps(ensemble)).member(0).A, ensemble.member(0).A
     )
     again = load_model(ensemble.save(tmp_path / "ensemble.nc"))

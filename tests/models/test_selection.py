@@ -9,6 +9,7 @@ from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
 from free_runs import loop_score
+from numpy.testing import assert_allclose, assert_array_equal
 from records import record
 from scipy import signal
 from squared import DT, INPUTS, PERIOD, STATES, runs
@@ -77,8 +78,8 @@ def test_free_runs_side_by_side_score_as_one_after_the_other(monkeypatch):
         for one, (scores, weights) in zip(tried, found, strict=True):
             ((alone, own),) = judge(problem, [one], fold)
             # Products of matrices are summed in another order.
-            np.testing.assert_allclose(scores, alone, rtol=0, atol=1e-9)
-            np.testing.assert_array_equal(weights, own)
+            assert_allclose(scores, alone, rtol=0, atol=1e-9)
+            assert_array_equal(weights, own)
         batches.append(len(tried))
         return found
 

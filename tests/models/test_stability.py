@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ensembles import few
+from numpy.testing import assert_allclose, assert_array_equal
 from oscillators import Oscillator
 from records import record
 
@@ -90,7 +91,7 @@ def test_a_forecast_that_was_lost_does_not_come_back():
     # x goes 1, 100, 0: what is back at zero was lost before.
     wild = replace(model, coefficients=np.array([[100.0, -1e4]]))
     out = wild.forecast_arrays([[0.0], [1.0]], [], [], steps=3)
-    np.testing.assert_array_equal(np.isnan(out[:, 0]), [True, True, True])
+    assert_array_equal(np.isnan(out[:, 0]), [True, True, True])
 
 
 # ``stable`` clips what grows, says so, and leaves the rest.
@@ -106,7 +107,7 @@ def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stabl
     model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])
     found = model.eigenvalues
     assert abs(found[0]) == pytest.approx(radius, rel=1e-9)
-    np.testing.assert_allclose(found[1:], grows[1:], atol=1e-9)
+    assert_allclose(found[1:], grows[1:], atol=1e-9)
     assert model.training.clipped == pytest.approx([abs(grows[0])], rel=1e-9)
     told = f"1 eigenvalue clipped to {radius:g}; the largest was {abs(grows[0]):.6f}"
     assert told in model.summary()
@@ -116,15 +117,15 @@ def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stabl
     after = system.A @ state + system.B @ (run.eta_fwd.values[[10]] - model.input_mean)
     step = model.forecast(run, start=1.0, steps=1)
     expected = step.heave.values - model.state_mean
-    np.testing.assert_allclose(system.C @ after, expected, rtol=1e-9)
+    assert_allclose(system.C @ after, expected, rtol=1e-9)
     x, u = run.heave.values[:11, None], run.eta_fwd.values[:11, None]
-    np.testing.assert_array_equal(model.initial_state_arrays(x, u), state)
+    assert_array_equal(model.initial_state_arrays(x, u), state)
 
 
 def test_a_stable_model_is_the_same_to_the_last_bit(run, channels):
     plain = HankelDMDc(2, 4, 100.0).fit(run, **channels)
     clipped = HankelDMDc(2, 4, 100.0, stable=True).fit(run, **channels)
-    np.testing.assert_array_equal(plain.coefficients, clipped.coefficients)
+    assert_array_equal(plain.coefficients, clipped.coefficients)
     assert clipped.training.clipped == ()
     assert "clipped" not in clipped.summary()
 
@@ -133,6 +134,6 @@ def test_members_are_clipped_too():
     delays = Fixed("0.1 s")
     spec = few(state_delays=delays, input_delays=delays, delay_rows="ridge", stable=0.95)
     ensemble = spec.fit(growing(), ["heave"], ["eta_fwd"])
-    np.testing.assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
+    assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
     assert len(ensemble.member(0).training.clipped) == 1
     assert "(stable, clipped to 0.95)" in ensemble.summary()

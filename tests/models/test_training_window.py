@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, SeakeepWarning
@@ -16,7 +17,7 @@ def test_a_stop_between_two_samples_takes_the_one_before(run, channels):
         same = spec.fit(run, stop=10.0, **channels)
         assert model.training.stop == same.training.stop == pytest.approx((10.0,))
         assert model.training.first == pytest.approx((5.05,))
-        np.testing.assert_array_equal(model.coefficients, same.coefficients)
+        assert_array_equal(model.coefficients, same.coefficients)
 
 
 @pytest.mark.parametrize("history", ["before", "inside"])
@@ -29,8 +30,8 @@ def test_moments_are_those_of_the_windows_pooled_with_ddof_one(make_run, channel
     ):
         pooled = np.concatenate([table(run, names)[-120:] for run in runs])
         # The same sums in the same order, or nearly.
-        np.testing.assert_allclose(mean, pooled.mean(axis=0), rtol=1e-13)
-        np.testing.assert_allclose(std, pooled.std(axis=0, ddof=1), rtol=1e-13)
+        assert_allclose(mean, pooled.mean(axis=0), rtol=1e-13)
+        assert_allclose(std, pooled.std(axis=0, ddof=1), rtol=1e-13)
 
 
 def test_ridge_per_snapshot_is_ridge_times_the_columns_of_all_runs(make_run, channels):
@@ -38,7 +39,7 @@ def test_ridge_per_snapshot_is_ridge_times_the_columns_of_all_runs(make_run, cha
     model = HankelDMDc(3, 8, 0.2, ridge_scale="per_snapshot").fit(runs, **channels)
     assert model.training.columns == (391, 391)
     same = HankelDMDc(3, 8, 0.2 * 782).fit(runs, **channels)
-    np.testing.assert_array_equal(model.A, same.A)
+    assert_array_equal(model.A, same.A)
 
 
 def test_a_rank_takes_the_place_of_ridge(run, channels):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import DT, FOLLOWED, INPUTS, drifting_run
+from numpy.testing import assert_allclose
 from records import table
 
 from seakeep import (
@@ -87,19 +88,19 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     # The same sums in another order, of loads of 30 N.
     close = {"rtol": 0, "atol": 1e-11}
     several = model.forecast_windows(run, [START * DT, 50.0], STEPS)
-    np.testing.assert_allclose(table(several, STATES)[0], table(expected, STATES), **close)
+    assert_allclose(table(several, STATES)[0], table(expected, STATES), **close)
     carried = reads_surge(model)
     x, u = table(run, STATES), table(model.aligned_inputs(run) if carried else run, INPUTS)
     if carried:  # as a whole record, and not up to the end of the forecast
         close["atol"] = 1e-6
     arrays = model.forecast_arrays(x[: START + 1], u[: START + 1], u[START + 1 :], STEPS)
-    np.testing.assert_allclose(arrays, table(expected, STATES), **close)
+    assert_allclose(arrays, table(expected, STATES), **close)
     if not carried:
         live = model.live(like=run)
         for at in range(START + 1):
             live.step(u[at], x[at])
         served = live.forecast(STEPS, u[START + 1 :]).isel(statistic=0)
-        np.testing.assert_allclose(table(served, STATES), table(expected, STATES), **close)
+        assert_allclose(table(served, STATES), table(expected, STATES), **close)
 
 
 def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_path):
@@ -122,10 +123,10 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
         read = dict(model.settings.readouts)  # once for all members, with the medians of delays
         plain = [name for name in STATES if name not in read]
         # One arithmetic in another order.
-        np.testing.assert_allclose(table(mine, STATES), table(own, STATES), atol=1e-9)
+        assert_allclose(table(mine, STATES), table(own, STATES), atol=1e-9)
         if model.signature.input_map.follows is None and not spec.observables:
             # Places and observables are learnt once for all members.
-            np.testing.assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
+            assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
     again = load_model(ensemble.save(tmp_path / "e.nc"))
     for same in (again, ensemble.hold()):
         xr.testing.assert_identical(forecast_of(same, run), found)
@@ -156,7 +157,7 @@ def test_training_reads_its_window_and_nothing_else(runs, model):
             each[name].values[:first] = np.nan
     found = model.settings.fit(poisoned, STATES, INPUTS, stop=110.0)
     # BLAS sums in an order that follows the memory.
-    np.testing.assert_allclose(found.coefficients, model.coefficients, rtol=0, atol=1e-11)
+    assert_allclose(found.coefficients, model.coefficients, rtol=0, atol=1e-11)
 
 
 def test_files_and_tables_of_settings_hold_it_all(model, run, expected, tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from records import record, table
 from scipy import signal
 
@@ -40,7 +41,7 @@ def koopman_pipeline(runs, s, z):
 def assert_equals_pykoop(model, runs, s, z):
     coefficients = koopman_pipeline(runs, s, z).regressor_.coef_.T
     found = np.hstack([model.A, model.B])
-    np.testing.assert_allclose(found, coefficients, rtol=0, atol=SAME_MATRICES)
+    assert_allclose(found, coefficients, rtol=0, atol=SAME_MATRICES)
 
 
 @pytest.mark.parametrize(("s", "z"), DELAYS)
@@ -71,9 +72,7 @@ def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
         episode_feature=False,
     )
     forecast = model.forecast(other, start=float(other.time[first - 1]), steps=160 - first)
-    np.testing.assert_allclose(
-        table(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST
-    )
+    assert_allclose(table(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST)
 
 
 @pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
@@ -91,7 +90,7 @@ def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge)
     oracle = linear_model.Ridge(alpha=ridge, fit_intercept=False, solver="cholesky")
     oracle.fit(np.array(rows), x[z + 1 :])
     ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
-    np.testing.assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
+    assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
 
 
 @pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3), (5, 0), (3, 1)])
@@ -112,8 +111,8 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, d
     _, output, _ = signal.dlsim(system, deviations, x0=model.initial_state(run, start=instant))
     physical, forecast = output + model.state_mean, model.forecast(run, start=instant, steps=steps)
     # The first output is the measured state at the start; values are of order one.
-    np.testing.assert_allclose(physical[0], table(run, STATES)[start], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
+    assert_allclose(physical[0], table(run, STATES)[start], rtol=0, atol=1e-12)
+    assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
 
 
 def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
@@ -142,4 +141,4 @@ def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     # Fewer columns than rows; with all rows regressed the primal form is still less work.
     assert model.training.method == "primal"
     # The primal inverse at this size, condition number near 1e4, is good to about 1e-12.
-    np.testing.assert_allclose(np.hstack([model.A, model.B]), g, rtol=0, atol=1e-10)
+    assert_allclose(np.hstack([model.A, model.B]), g, rtol=0, atol=1e-10)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from tables import rows_of
 
 from seakeep.files import check_output
@@ -79,7 +80,7 @@ def test_errors_are_those_that_can_be_computed_by_hand_in_any_unit():
     assert heave["fit"] == pytest.approx(fit, rel=1e-12)
     assert radians["sd_ratio"].sel(channel="pitch") == pytest.approx(0.9, rel=1e-12)
     for measure in ("nrmse", "training_nrmse"):
-        np.testing.assert_allclose(radians[measure], degrees[measure], rtol=1e-12)
+        assert_allclose(radians[measure], degrees[measure], rtol=1e-12)
     pitch = degrees.sel(channel="pitch")
     assert str(pitch["channel_units"].values) == "deg"
     assert pitch["measured_max"] == pytest.approx(np.degrees(0.1 * np.cos(TIME).max()))
@@ -102,7 +103,7 @@ def test_the_band_of_an_ensemble_is_judged_by_hand():
     assert np.isnan(judged["coverage"].sel(channel="heave"))
     assert judged["mean_coverage"] == judged["coverage"].mean()
     degrees = row_of(in_degrees(ensemble()))
-    np.testing.assert_array_equal(table["coverage"], degrees["coverage"])
+    assert_array_equal(table["coverage"], degrees["coverage"])
     assert degrees["band_width"].sel(channel="pitch") == pytest.approx(np.degrees(0.4))
 
 
@@ -134,7 +135,7 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
         for name, factor in {"ours": 0.9, "theirs": 0.8}.items()
     }
     table = difference_table(found)
-    np.testing.assert_allclose(table["wave_period"], [2.0, 1.0], rtol=1e-3)  # by interpolation
+    assert_allclose(table["wave_period"], [2.0, 1.0], rtol=1e-3)  # by interpolation
     by_run, changes = difference_blocks(table)
     assert by_run.columns == ("run", "waves, s", "ours", "theirs")
     assert by_run.rows[0] == ("short", "1", "0.100", "0.200")

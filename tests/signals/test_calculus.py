@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from seakeep.signals import band_pass, differentiate, envelope_squared, integrate
 
@@ -39,7 +40,7 @@ def test_gain_of_the_band(frequency, gain):
 def test_derivative_of_a_quartic_is_exact():
     # Fourth order, at the ends too; rounding of T⁴ = 4e7 over dt.
     t = np.arange(0, 2, 0.1)
-    np.testing.assert_allclose(differentiate(t**4 - t, 0.1), 4 * t**3 - 1, atol=1e-11)
+    assert_allclose(differentiate(t**4 - t, 0.1), 4 * t**3 - 1, atol=1e-11)
 
 
 def test_envelope_of_a_group():
@@ -47,4 +48,4 @@ def test_envelope_of_a_group():
     out = envelope_squared(5.0 + slow * np.sin(2 * np.pi * 1.0 * T), DT)
     # The kernel of the Hilbert transform falls as 1/(π t): a kink at an end, 25 s away, leaks
     # about 1/(π ω t) = 0.002 of its size, twice an amplitude of 1.4, into a square of 2.
-    np.testing.assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)
+    assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from seas import sea
 
 from seakeep.core.recursion import carried
@@ -49,7 +50,7 @@ def test_a_carrier_reads_its_own_samples_alone(spectrum):
     expected = carried(taps, record)
     row = 100  # belongs to sample row + BACK
     record[:row] = record[row + BACK + AHEAD + 1 :] = 1e9
-    np.testing.assert_array_equal(carried(taps, record)[row], expected[row])
+    assert_array_equal(carried(taps, record)[row], expected[row])
     record[row + BACK + AHEAD] += 1.0
     assert carried(taps, record)[row, 0] - expected[row, 0] == pytest.approx(taps[0, :, -1].sum())
 
@@ -68,4 +69,4 @@ def test_the_position_follows_a_slow_oscillation_and_holds_at_rest():
     assert np.std(place[: len(true)] - true) < 0.15 * slow.std()
     # Without delay: what the weights are fitted to.
     middle = slice(400, -400)
-    np.testing.assert_allclose(slow_position(slow + quick, period)[middle], slow[middle], atol=0.02)
+    assert_allclose(slow_position(slow + quick, period)[middle], slow[middle], atol=0.02)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.errors import RequestError
 from seakeep.signals.expressions import parse
@@ -26,14 +27,14 @@ A, B = np.array([1.0, 2.0, 6.0]), np.array([4.0, -1.0, 0.5])
 )  # fmt: skip
 def test_values(text, expected):
     # Sums in one order or another: rounding.
-    np.testing.assert_allclose(parse(text).evaluate({"a": A, "b": B}), expected, rtol=1e-14)
+    assert_allclose(parse(text).evaluate({"a": A, "b": B}), expected, rtol=1e-14)
 
 
 def test_names_between_backticks():
     expression = parse("2 * `WP 1 [m]` - `μ` / x")
     assert expression.channels == ("WP 1 [m]", "μ", "x")
     values = {"WP 1 [m]": A, "μ": B, "x": A}
-    np.testing.assert_array_equal(expression.evaluate(values), 2 * A - B / A)
+    assert_array_equal(expression.evaluate(values), 2 * A - B / A)
 
 
 @pytest.mark.parametrize(

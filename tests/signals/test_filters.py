@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal
 
 from seakeep.signals import low_pass, lowpass_taps
@@ -21,7 +22,7 @@ def test_gains_of_the_taps(passband, ratio, attenuation):
     assert np.max(np.abs(gain[frequency <= passband] - 1)) < ripple
     assert np.max(gain[frequency >= stopband]) < ripple
     assert taps.size % 2 == 1
-    np.testing.assert_array_equal(taps, taps[::-1])
+    assert_array_equal(taps, taps[::-1])
     assert taps.sum() == pytest.approx(1.0, rel=1e-12)  # unit gain at 0 Hz, to rounding
 
 
@@ -33,4 +34,4 @@ def test_constants_and_ramps_are_kept_up_to_the_ends():
     t = np.arange(0, 10, 0.01)
     for series in (np.full(t.size, 3.0), 2.0 * t - 1.0):
         # Point reflection continues a ramp exactly: only rounding is left.
-        np.testing.assert_allclose(low_pass(series, 0.01, 2.0), series, atol=1e-12)
+        assert_allclose(low_pass(series, 0.01, 2.0), series, atol=1e-12)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.signals import bridge, inspect_times, onto_uniform
 
@@ -15,9 +16,9 @@ def test_gaps_are_told_and_masked():
     assert report.gaps == ((1.98, 0.22), (5.98, 0.04))
     assert (report.missing, report.jittered) == (11, False)
     time, x = onto_uniform(t[kept], np.sin(t[kept]))
-    np.testing.assert_allclose(time, t, atol=1e-12)
-    np.testing.assert_array_equal(np.isnan(x), ~kept)
-    np.testing.assert_array_equal(x[kept], np.sin(t[kept]))
+    assert_allclose(time, t, atol=1e-12)
+    assert_array_equal(np.isnan(x), ~kept)
+    assert_array_equal(x[kept], np.sin(t[kept]))
 
 
 def test_jitter_is_told_and_interpolated_away():
@@ -29,7 +30,7 @@ def test_jitter_is_told_and_interpolated_away():
     time, x = onto_uniform(t, np.sin(2 * np.pi * t))
     assert np.ptp(np.diff(time)) < 1e-12
     # A wave of 50 samples: cubic splines leave 1e-5, and the first sample is held.
-    np.testing.assert_allclose(x[1:-1], np.sin(2 * np.pi * time)[1:-1], atol=1e-4)
+    assert_allclose(x[1:-1], np.sin(2 * np.pi * time)[1:-1], atol=1e-4)
 
 
 def test_short_gaps_are_bridged_and_long_ones_marked():
@@ -43,4 +44,4 @@ def test_short_gaps_are_bridged_and_long_ones_marked():
     # 0.15 s of a wave of 2 s, beside its crest: a monotone cubic cuts off 1 − cos(π 0.15/2).
     assert np.max(np.abs(result.values - x)[100:115]) < 0.03
     there = np.isfinite(holed)
-    np.testing.assert_array_equal(result.values[there], x[there])
+    assert_array_equal(result.values[there], x[there])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import seas
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
@@ -36,7 +37,7 @@ def test_what_is_missing_is_filled_from_the_record_after_the_last_gap():
     series[7:, 0] = series[9:11, 1] = np.nan  # the second probe is back at the end
 
     def foreseen(record, count):
-        np.testing.assert_array_equal(record, series[4:7])
+        assert_array_equal(record, series[4:7])
         departures = np.arange(1.0, 21.0).reshape(2, 5, 2)
         return Foreseen(100.0 + np.arange(10.0).reshape(5, 2), departures, 3.0)
 
@@ -44,13 +45,13 @@ def test_what_is_missing_is_filled_from_the_record_after_the_last_gap():
     assert (first, freedom) == (7, 3.0)
     filled = series.copy()
     filled[7:, 0], filled[9:11, 1] = 100.0 + np.arange(0.0, 10.0, 2), [105.0, 107.0]
-    np.testing.assert_array_equal(futures[0], filled)
+    assert_array_equal(futures[0], filled)
     moved = np.zeros((2, 5, 2))
     moved[0] = np.arange(1.0, 11.0).reshape(5, 2)
     moved[1, 2:] = np.arange(11.0, 17.0).reshape(3, 2)  # from where it is first missing on
     moved[:, [0, 1, 4], 1] = 0.0  # what is measured does not depart
-    np.testing.assert_array_equal(futures[1:3, 7:] - filled[7:], moved)
-    np.testing.assert_array_equal(futures[3:] + futures[1:3], [2 * filled] * 2)
+    assert_array_equal(futures[1:3, 7:] - filled[7:], moved)
+    assert_array_equal(futures[3:] + futures[1:3], [2 * filled] * 2)
 
 
 def test_short_gaps_are_closed_by_cubics_and_the_newest_by_what_there_is():
@@ -62,10 +63,10 @@ def test_short_gaps_are_closed_by_cubics_and_the_newest_by_what_there_is():
     for series, places in ((cubic, t < 30), (square, t > 30)):
         record, gone = np.where(lost, 9.0, series), lost.copy()
         close_gaps(record, gone, 8)
-        np.testing.assert_array_equal(gone, left)
-        np.testing.assert_array_equal(record[left], 9.0)
+        assert_array_equal(gone, left)
+        assert_array_equal(record[left], 9.0)
         closed = places & ~left
-        np.testing.assert_allclose(record[closed], series[closed], rtol=1e-12)
+        assert_allclose(record[closed], series[closed], rtol=1e-12)
 
 
 def test_columns_are_continued_alone_and_a_still_one_stays():
@@ -73,8 +74,8 @@ def test_columns_are_continued_alone_and_a_still_one_stays():
     both = np.stack([np.sin(0.3 * np.arange(300)), np.full(300, 0.7)], axis=1)
     both[:, 0] += 0.1 * rng.standard_normal(300)
     found = predict_waves(both, 30)
-    np.testing.assert_array_equal(found[:, 0], predict_waves(both[:, 0], 30))
-    np.testing.assert_allclose(found[:, 1], 0.7, rtol=1e-12)
+    assert_array_equal(found[:, 0], predict_waves(both[:, 0], 30))
+    assert_allclose(found[:, 1], 0.7, rtol=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +94,7 @@ def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
     found, alone = foreseen(sea, [0.0, 2.0, 4.0]), foreseen(sea, [np.nan] * 3)
     spread = sea.std(axis=0)
     errors = [(each.expected - sea[900:]) / spread for each in (found, alone)]
-    np.testing.assert_array_equal(errors[0][:, 0], errors[1][:, 0])
+    assert_array_equal(errors[0][:, 0], errors[1][:, 0])
     claimed = np.sqrt(np.cumsum((found.departures**2).sum(axis=0), axis=0)) / spread
     for column, x in ((1, 2.0), (2, 4.0)):
         known = int(predictable_time(sea[:900, 0], 0.1, x, 3.6) / 0.1)
@@ -137,6 +138,6 @@ def test_probes_that_do_not_see_the_same_waves_are_continued_alone(sea):
     still = np.stack([np.zeros(960), sea[:, 0]], axis=1)
     for record, positions in ((turned, [0.0, 2.0, 4.0]), (still, [0.0, 1.0])):
         apart, alone = foreseen(record, positions), foreseen(record, [np.nan] * len(positions))
-        np.testing.assert_array_equal(apart.expected, alone.expected)
-        np.testing.assert_array_equal(apart.departures, alone.departures)
-        np.testing.assert_array_equal(alone.expected, predict_waves(record[:900], 60))
+        assert_array_equal(apart.expected, alone.expected)
+        assert_array_equal(apart.departures, alone.departures)
+        assert_array_equal(alone.expected, predict_waves(record[:900], 60))

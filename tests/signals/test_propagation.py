@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from seas import sea
 
 from seakeep.signals import carry_by_celerity, carry_by_dispersion
@@ -43,7 +44,7 @@ def test_one_celerity_is_the_paper_s_delay():
     carried = carried_to(place, carry_by_celerity, slow, celerity)
     late = TIME - place / celerity
     exact = 0.3 * np.cos(3.0 * late + 0.4) + 0.2 * np.cos(5.1 * late)
-    np.testing.assert_allclose(carried[INNER], exact[INNER], atol=1e-4)
+    assert_allclose(carried[INNER], exact[INNER], atol=1e-4)
 
 
 def test_nothing_moves_at_no_distance():
@@ -51,10 +52,10 @@ def test_nothing_moves_at_no_distance():
     # A transform and its inverse, at the rounding of values of some 10.
     for carry, by in ((carry_by_dispersion, DEPTH), (carry_by_celerity, 2.8)):
         here = carry(record, DT, (0.0, 0.0), by).at(0.0)
-        np.testing.assert_allclose(here.reshape(record.shape), record, atol=1e-12)
+        assert_allclose(here.reshape(record.shape), record, atol=1e-12)
 
 
 def test_a_place_outside_the_range_is_taken_to_its_end():
     carried = carry_by_dispersion(WAVES.at(TIME), DT, (0.0, 1.0), DEPTH)
-    np.testing.assert_array_equal(carried.at(5.0), carried.at(1.0))
-    np.testing.assert_allclose(carried.at(0.4, 100), carried.at(np.full(5, 0.4), slice(98, 103))[2])
+    assert_array_equal(carried.at(5.0), carried.at(1.0))
+    assert_allclose(carried.at(0.4, 100), carried.at(np.full(5, 0.4), slice(98, 103))[2])

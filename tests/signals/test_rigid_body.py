@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose
 
 from seakeep.errors import RequestError
 from seakeep.signals import complementary_filter, froude_factor, rotation_matrix, transfer_position
@@ -13,7 +14,7 @@ def test_yaw_is_after_pitch_after_roll():
     """What is made of it: `tests/campaign/test_steps.py`."""
     angles = np.array([0.3, -0.4, 0.5])
     roll, pitch, yaw = rotation_matrix(np.diag(angles))
-    np.testing.assert_allclose(rotation_matrix([angles])[0], yaw @ pitch @ roll, atol=1e-15)
+    assert_allclose(rotation_matrix([angles])[0], yaw @ pitch @ roll, atol=1e-15)
 
 
 def test_blend_keeps_slow_motion_and_needs_no_drift_removal():
@@ -55,8 +56,8 @@ def test_full_scale_run():
         {"dt": 0.1, "train_span": (0.0, 0.2), "water_depth": 3.6, "run": "a", "probe_offset": 0.3},
     )
     full = to_full_scale(run, 100.0)
-    np.testing.assert_allclose(full["time"], [0.0, 1.0, 2.0])
-    np.testing.assert_allclose(full["heave"], [10, 20, 10])
+    assert_allclose(full["time"], [0.0, 1.0, 2.0])
+    assert_allclose(full["heave"], [10, 20, 10])
     assert full["heave"].attrs["training_std"] == 5.0
     assert (full.attrs["dt"], full.attrs["train_span"]) == (1.0, (0.0, 2.0))
     assert full.attrs["probe_offset"] == 30.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy import special
 
 from seakeep.errors import DataError
@@ -76,10 +77,10 @@ def test_tabulated_kernels_are_the_kernels(new_dt, attenuation):
     nyquist = 0.5 / max(1.0, new_dt)
     expected = direct_sums(series, wanted, (0.8 * nyquist, nyquist), attenuation)
     out = resample(series, np.arange(12000.0), wanted, attenuation)
-    np.testing.assert_allclose(out, expected, atol=2e-9)
+    assert_allclose(out, expected, atol=2e-9)
 
 
 def test_constants_are_kept_exactly_to_the_ends():
     time = np.arange(0, 20, 0.01)
     out = resample(np.full(time.size, 7.0), time, np.arange(0, 19.9, 0.0513))
-    np.testing.assert_allclose(out, 7.0, rtol=1e-14)  # rounding of a sum
+    assert_allclose(out, 7.0, rtol=1e-14)  # rounding of a sum

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from small_tank import write_csv
 
 from seakeep.campaign import read_table
@@ -111,7 +112,7 @@ def test_motions_of_the_centre_of_gravity(plain, tracked):
     x, y = tank_video.pixel_of(0.0, COG + tank_video.PANEL_HEIGHT)
     how = TrackingSettings(metres_per_pixel=0.0025, origin=(float(x), float(y)), lamp=(40, 40, 8))
     out = track_video(plain[0], how)
-    np.testing.assert_allclose(tracked.time, np.arange(FRAMES) / RATE, rtol=1e-12)
+    assert_allclose(tracked.time, np.arange(FRAMES) / RATE, rtol=1e-12)
     limits = {"surge": 1e-3, "heave": 1e-3, "pitch": np.deg2rad(0.05)}  # 1 mm is 0.4 pixel
     for (name, limit), true in zip(limits.items(), motion(out.time), strict=True):
         # Without half a filter length, where its end conditions show.
@@ -148,7 +149,7 @@ def test_a_hidden_corner_is_flagged_before_it_spoils_the_pitch(tmp_path):
     place = render(path, hook, frames=36)
     out = track_video(path)
     bad = np.isin(np.arange(36), hidden)
-    np.testing.assert_array_equal(out["flag"] == FLAGS["occluded"], bad)
+    assert_array_equal(out["flag"] == FLAGS["occluded"], bad)
     assert np.all(out["flag"][~bad] == FLAGS["good"])
     # What is flagged here was wrong by more than what is asked for, and looks sound otherwise.
     _, _, pitch = motion(out.time)
@@ -178,7 +179,7 @@ def test_flags_of_bad_frames(disturbed):
     expected[BURNT] = FLAGS["overexposed"]
     expected[WASHED] = FLAGS["overexposed"]
     expected[DARK] = FLAGS["lost"]
-    np.testing.assert_array_equal(out["flag"], expected)
+    assert_array_equal(out["flag"], expected)
     bad = expected != FLAGS["good"]
     assert np.all(out["quality"][bad] < 0.5)
     assert np.all(out["quality"][~bad] > 0.8)
@@ -246,9 +247,9 @@ def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, c
     table = read_table(plain[0].parent / "track.csv")
     assert table["pitch"].attrs["units"] == "deg"
     # Written with six decimals of a metre, five of a degree and six of a second.
-    np.testing.assert_allclose(table["surge"], tracked["surge"], atol=1e-6)
-    np.testing.assert_allclose(np.deg2rad(table["pitch"]), tracked["pitch"], atol=1e-6)
-    np.testing.assert_allclose(table["time"], tracked.time, atol=1e-6)
+    assert_allclose(table["surge"], tracked["surge"], atol=1e-6)
+    assert_allclose(np.deg2rad(table["pitch"]), tracked["pitch"], atol=1e-6)
+    assert_allclose(table["time"], tracked.time, atol=1e-6)
     assert cv2.imread("sheet.png").shape[1] == 1440
 
 
@@ -266,8 +267,8 @@ def test_the_command_compares_bridges_short_gaps_and_writes_netcdf(disturbed, tm
     stored = xr.load_dataset(out)
     assert '"bridge": 0.2' in stored.attrs["settings"]
     short = np.isin(np.arange(FRAMES), [*OCCLUDED, *BURNT, *WASHED])
-    np.testing.assert_array_equal(stored["bridged"], short)
-    np.testing.assert_array_equal(np.isnan(stored["heave"]), np.isin(np.arange(FRAMES), DARK))
+    assert_array_equal(stored["bridged"], short)
+    assert_array_equal(np.isnan(stored["heave"]), np.isin(np.arange(FRAMES), DARK))
     _, _, pitch = motion(stored["time"])
     # Four frames of a 1.67 s period, by cubics whose slope is estimated from one side.
     assert np.rad2deg(rms((stored["pitch"] - pitch)[short])) < 0.5

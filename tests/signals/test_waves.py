@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from seas import sea
 
 from seakeep.signals import (
@@ -17,7 +18,7 @@ from seakeep.signals import (
 
 
 def test_crossings_lie_between_samples():
-    np.testing.assert_allclose(zero_up_crossings([-1.0, 3.0, -1.0, -1.0], 0.5), [0.125])
+    assert_allclose(zero_up_crossings([-1.0, 3.0, -1.0, -1.0], 0.5), [0.125])
 
 
 def test_the_spectrum_holds_the_variance():
@@ -57,7 +58,7 @@ T = 0.02 * np.arange(12_000)
 def test_a_record_that_begins_and_ends_in_waves_is_counted_as_the_paper_does(seed):
     x = sea(seed).at(T[:6000])
     assert encounter_period(x, 0.02) == encounter_period(x, 0.02, still=0.0)
-    np.testing.assert_array_equal(zero_up_crossings(x, 0.02), zero_up_crossings(x, 0.02, 0, 0))
+    assert_array_equal(zero_up_crossings(x, 0.02), zero_up_crossings(x, 0.02, 0, 0))
     assert waves_part(x, 0.02) == slice(0, x.size)
 
 

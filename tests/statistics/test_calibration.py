@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal, stats
 
 from seakeep.core.calibration import (
@@ -32,16 +33,16 @@ def test_a_band_that_is_too_narrow_covers_what_it_says_in_new_windows():
     y = drawn(40)
     plain = coverage(np.broadcast_to(-half, y.shape), np.broadcast_to(half, y.shape), y)
     expected = 2 * stats.norm.cdf(1.96 / 3) - 1
-    np.testing.assert_allclose(plain.inside.mean(axis=0), expected, atol=0.02)
+    assert_allclose(plain.inside.mean(axis=0), expected, atol=0.02)
     found = conformal_margin(band_scores(-half + 0 * y, half + 0 * y, y), 0.95)
     new = drawn(400)
     reach = half + found.margin
     inside = (np.abs(new) <= reach).mean(axis=(0, 1))
     # The quantile of 8000 scores has a standard error of √(0.95 · 0.05 / 8000) = 0.0024 in
     # probability, and the 80 000 new ones add 0.0008: three of both.
-    np.testing.assert_allclose(inside, 0.95, atol=0.008)
+    assert_allclose(inside, 0.95, atol=0.008)
     # What the distribution asks for: 1.96 SD.
-    np.testing.assert_allclose(reach, [1.96, 39.2], rtol=0.05)
+    assert_allclose(reach, [1.96, 39.2], rtol=0.05)
 
 
 def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
@@ -79,9 +80,9 @@ def test_a_learnt_scale_is_the_one_that_the_errors_have():
     floor = 1e-3 * spread_floor(mean, y)  # the spread alone, and no floor
     law = learn_scale(mean, std, y, envelope, floor)
     # 20,000 normal errors know a logarithm of their scale to 1/√40,000; the ridge takes 0.1 %.
-    np.testing.assert_allclose(law[1:, 0], [0.5, 0.3, 0.8], atol=0.03)
+    assert_allclose(law[1:, 0], [0.5, 0.3, 0.8], atol=0.03)
     found = band_scale(std, floor, law, envelope)
-    np.testing.assert_allclose(np.log(found / sigma), 0.0, atol=0.1)
+    assert_allclose(np.log(found / sigma), 0.0, atol=0.1)
 
 
 def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
@@ -101,8 +102,8 @@ def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
     for step in range(steps):
         expected = np.sqrt(np.mean(waves[:, step : step + z + 1] ** 2, axis=(1, 2)))
         # Differences of running sums.
-        np.testing.assert_allclose(found[:, step], expected, rtol=1e-12)
-    np.testing.assert_array_equal(wave_envelope(np.empty((2, 12, 0)), steps), 1.0)
+        assert_allclose(found[:, step], expected, rtol=1e-12)
+    assert_array_equal(wave_envelope(np.empty((2, 12, 0)), steps), 1.0)
 
 
 def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
@@ -113,7 +114,7 @@ def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
     assert spread_floor(mean[1:], y[1:])[0] == 1.0
     std = np.array([[[0.0], [1.0]], [[np.nan], [np.nan]]])
     scores = scaled_scores(mean, band_scale(std, floor), y)
-    np.testing.assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
+    assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
     assert np.isinf(scores[1]).all()
     # Neither error nor scale: a channel that never moves.
     assert scaled_scores(y * 0, y * 0, y * 0).max() == 0.0
@@ -135,7 +136,7 @@ def test_a_band_is_never_narrowed():
 def test_scores_by_hand_and_a_band_that_is_lost():
     lower, upper = np.array([[0.0], [0.0], [np.nan]]), np.array([[1.0], [2.0], [3.0]])
     found = band_scores(lower, upper, np.array([[1.5], [0.5], [1.0]]))
-    np.testing.assert_array_equal(found[:, 0], [0.5, -0.5, np.inf])
+    assert_array_equal(found[:, 0], [0.5, -0.5, np.inf])
     # Lost in more of the windows than the level leaves: no margin is wide enough.
     scores = np.concatenate([np.zeros((3, 10, 1)), np.full((1, 10, 1), np.inf)])
     assert conformal_margin(scores, 0.9, block_length=1).margin[0] == np.inf

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import integrate
 from scipy.stats import norm
 
@@ -71,8 +72,8 @@ def test_the_score_of_the_true_band_is_that_of_the_normal_distribution():
 
 def test_scores_of_bands_without_width_lost_or_infinite():
     lower, upper = np.array([1.0, np.nan, -np.inf]), np.array([1.0, 2.0, np.inf])
-    np.testing.assert_array_equal(band_crps(lower, upper, 3.0), [2.0, np.nan, np.inf])
-    np.testing.assert_array_equal(winkler_score(lower, upper, 3.0, 0.5), [8.0, np.nan, np.inf])
+    assert_array_equal(band_crps(lower, upper, 3.0), [2.0, np.nan, np.inf])
+    assert_array_equal(winkler_score(lower, upper, 3.0, 0.5), [8.0, np.nan, np.inf])
 
 
 def test_a_table_by_wave_height_and_horizon_by_hand():
@@ -100,13 +101,13 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
         inside = (each >= -1) & (each <= 2)
         scores = inside, winkler_score(-1, 2, each, 0.9), band_crps(-1, 2, each, 0.9)
         expected = *(score.mean(axis=0) for score in scores), 3 / spread
-        np.testing.assert_allclose(found, expected, rtol=1e-12)
+        assert_allclose(found, expected, rtol=1e-12)
     lower[0, 2, 1] = np.nan  # of one channel alone
     parted = coverage_table(lower[:3], upper[:3], y, 0.9)
     for k, kept in ((0, slice(0, 3)), (1, slice(1, 3))):
         alone = coverage_table(*(each[kept, :, k:][..., :1] for each in (lower, upper, y)), 0.9)
         for key in ("inside", "width", "winkler", "crps"):
-            np.testing.assert_allclose(getattr(parted, key)[:, k], getattr(alone, key)[:, 0])
+            assert_allclose(getattr(parted, key)[:, k], getattr(alone, key)[:, 0])
     without = coverage_table(lower, upper, np.where(np.isnan(lower), 0, lower), 0.9)
     assert without.parts == ("all", "first third", "middle third", "last third")
 
@@ -123,8 +124,8 @@ def test_boxes_are_matplotlibs_for_any_numbers(values):
     # Both interpolate linearly in one order statistic or two; the last digit may differ.
     names = ["median", "lower_quartile", "upper_quartile", "mean", "lower_whisker", "upper_whisker"]
     expected = [theirs[key] for key in ("med", "q1", "q3", "mean", "whislo", "whishi")]
-    np.testing.assert_allclose([getattr(ours, name) for name in names], expected, atol=1e-9)
-    np.testing.assert_array_equal(ours.outliers, np.sort(theirs["fliers"]))
+    assert_allclose([getattr(ours, name) for name in names], expected, atol=1e-9)
+    assert_array_equal(ours.outliers, np.sort(theirs["fliers"]))
 
 
 def test_diverged_values_are_left_out_and_counted():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from tutorial_study import edit
 
 from seakeep.study import read_study, run_study
@@ -28,7 +29,7 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
         parts = {name: plan.runs[name] for name in ("first", "second")}  # they train as a whole
         calibrated = ensemble.calibrate(parts, steps, scale="learnt")
         alone = calibrated.calibration
-        np.testing.assert_allclose(kept["margin"][k], alone.conformal.margin, rtol=1e-9)
+        assert_allclose(kept["margin"][k], alone.conformal.margin, rtol=1e-9)
         assert kept["windows"][k] == sum(alone.windows.values()) > 0
         for window in plan.tests["unseen"]:
             run = plan.runs[window.run]
@@ -42,14 +43,14 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
         test="unseen", model="bayesian", against="measured"
     )
     inside = table["inside"].sel(band="calibrated")[1:]
-    np.testing.assert_allclose(inside, by_channel, rtol=1e-9)
+    assert_allclose(inside, by_channel, rtol=1e-9)
     members, calibrated = table["relative_width"]
     assert (calibrated > members).all()
     bands = found.groups["statistics/bands"].sel(test="unseen", model="bayesian", band="calibrated")
-    np.testing.assert_allclose(bands["inside"].sel(part="all"), by_channel, rtol=1e-9)
+    assert_allclose(bands["inside"].sel(part="all"), by_channel, rtol=1e-9)
     # Parts by wave height are thirds of the same instants.
     thirds = bands["crps"].sel(part=["lowest waves", "middle waves", "highest waves"])
-    np.testing.assert_allclose(thirds.mean("part"), bands["crps"].sel(part="all"))
+    assert_allclose(thirds.mean("part"), bands["crps"].sel(part="all"))
 
 
 def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run_by_none(
@@ -81,7 +82,7 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
     for name in plan.states:
         spoilt[name].values[:] = 1e6
     again = margins({**runs, "unseen": spoilt})
-    np.testing.assert_array_equal(again["margin"], found["margin"])
+    assert_array_equal(again["margin"], found["margin"])
     # The margin of one run alone is another: both count.
     fewer = {**runs, "second": runs["second"].map(lambda each: each * 1.5, keep_attrs=True)}
     assert (margins(fewer)["margin"] != found["margin"]).any()
@@ -111,7 +112,7 @@ def test_sets_without_a_window_that_is_not_read_or_tests_have_no_margin(
     assert list(kept["training"].values) == list(unread)
     windows = kept["windows"].values > 0
     assert windows.tolist() == list(unread.values())
-    np.testing.assert_array_equal(kept["margin"].notnull().all("channel"), windows)
+    assert_array_equal(kept["margin"].notnull().all("channel"), windows)
     table = found.groups["statistics/coverage"].sel(
         test="unseen", channel="average", against="measured"
     )

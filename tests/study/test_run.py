@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
 from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
 from seakeep.errors import RequestError, SeakeepWarning
@@ -51,17 +52,17 @@ def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_cha
     parts = split_bands(p - m, finished.attrs["dt"], 1 / (3 * finished.attrs["encounter_period"]))
     found = [np.mean(np.abs(part) / m.std(axis=0, ddof=1), axis=1) for part in parts]
     bands = cell["error_over_time"].sel(model="bayesian", band=["low", "wave"])
-    np.testing.assert_allclose(bands, found, rtol=1e-12)  # means of few channels
+    assert_allclose(bands, found, rtol=1e-12)  # means of few channels
     mean = test["error_over_time"].mean(("training", "window"))
-    np.testing.assert_allclose(*xr.align(trend["error_mean"].transpose(*mean.dims), mean))
+    assert_allclose(*xr.align(trend["error_mean"].transpose(*mean.dims), mean))
     cell = cell.sel(model="deterministic")
     error = np.abs(cell["mean"] - cell["measured"]) / cell["measured"].std("time", ddof=1)
     age = cell["time"] - cell["time"][0]
     slope = error.polyfit("time", 1)["polyfit_coefficients"].sel(degree=1) * float(age[-1])
     # A line of least squares and a mean, summed in another order.
     at = cell.sel(band="all")
-    np.testing.assert_allclose(at["growth"], slope, rtol=1e-9)
-    np.testing.assert_allclose(at["level"], error.mean("time"), rtol=1e-12)
+    assert_allclose(at["growth"], slope, rtol=1e-9)
+    assert_allclose(at["level"], error.mean("time"), rtol=1e-12)
 
 
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
@@ -143,8 +144,8 @@ def test_joined_series_are_the_windows_end_to_end(finished):
     predicted, measured, diverged = joined(test, "bayesian")
     assert diverged == 0
     assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
-    np.testing.assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
-    np.testing.assert_array_equal(predicted[1, -1], test["mean"].sel(model="bayesian")[1, -1, -1])
+    assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
+    assert_array_equal(predicted[1, -1], test["mean"].sel(model="bayesian")[1, -1, -1])
 
 
 OPEN = """

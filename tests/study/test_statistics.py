@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from cells import cells
+from numpy.testing import assert_allclose, assert_array_equal
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
@@ -79,16 +80,14 @@ def test_a_forecast_that_runs_far_away_moves_no_density_of_another(found):
     test["mean"].loc[{"model": wild}] *= 300.0
     after = density_tables(test, found.channels, settings, "unseen", None)["divergence"]
     # On a grid of both models, and on one of its own: sums of smooth functions.
-    np.testing.assert_allclose(
-        after["mean"].sel(model=kept), before["mean"].sel(model=kept), rtol=1e-2
-    )
+    assert_allclose(after["mean"].sel(model=kept), before["mean"].sel(model=kept), rtol=1e-2)
     assert (after["mean"].sel(model=wild) > before["mean"].sel(model=wild)).all()
 
 
 def test_the_truth_is_read_at_the_instants_of_the_windows(found):
     test = found.tests["unseen"]
     heave = test.sel(channel="heave")
-    np.testing.assert_allclose(heave["truth"], heave["measured"] + 0.005, rtol=0, atol=1e-9)
+    assert_allclose(heave["truth"], heave["measured"] + 0.005, rtol=0, atol=1e-9)
     assert np.isnan(test["truth"].sel(channel="pitch")).all()
     table = found.groups["statistics/coverage"].sel(test="unseen", model="bayesian", band="members")
     assert list(table["against"].values) == ["measured", "truth"]
@@ -121,11 +120,11 @@ def test_coverage_by_hand():
     row = band_tables(four(), None, 0.95)["coverage"].sel(
         model="m", band="members", against="measured"
     )
-    np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
-    np.testing.assert_allclose(row["below"], 0.5, rtol=1e-15)
+    assert_allclose(row["inside"], 0.5, rtol=1e-15)
+    assert_allclose(row["below"], 0.5, rtol=1e-15)
     # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).
     heave = 32.5 / np.sqrt(8 / 7) * np.mean([1, 0.5, 1])
-    np.testing.assert_allclose(
+    assert_allclose(
         row["relative_width"].sel(channel=["heave", "pitch"]), [heave, heave / 10], rtol=1e-12
     )
 
@@ -137,17 +136,17 @@ def test_a_calibrated_band_that_is_infinite_counts_neither_as_inside_nor_as_wide
     )
     tables = band_tables(four(), calibration, 0.95)
     row = tables["coverage"].sel(model="m", band="calibrated", against="measured")
-    np.testing.assert_allclose(row["inside"], 0.5)
+    assert_allclose(row["inside"], 0.5)
     # Widths of 62 and 7 in turns; of heave in the first training set alone.
     heave = 34.5 / np.sqrt(8 / 7) * np.mean([1, 0.5])
     assert row["relative_width"].sel(channel="heave") == pytest.approx(heave, rel=1e-12)
     bands = tables["bands"].sel(model="m", band="calibrated", part="all")
-    np.testing.assert_allclose(bands["inside"], 0.5)
-    np.testing.assert_allclose(bands["width"], 34.5)
+    assert_allclose(bands["inside"], 0.5)
+    assert_allclose(bands["width"], 34.5)
     endless = calibration.assign(margin=calibration["margin"].max("training"))
     tables = band_tables(four(), endless.expand_dims(training=2), 0.95)
     bands = tables["bands"].sel(model="m", band="calibrated", part="all")
-    np.testing.assert_array_equal(bands["inside"].isnull(), [True, False])
+    assert_array_equal(bands["inside"].isnull(), [True, False])
 
 
 def test_boxes_are_those_of_the_judged_cells():
@@ -213,7 +212,7 @@ def test_differences_between_models_have_intervals_and_verdicts():
     found = difference_table(test, TRAINING, rng).sel(measure="nrmse")
     # The same cells but for a factor: no draw can tell another change than the factor's.
     for key in ("change", "lower", "upper"):
-        np.testing.assert_allclose(found[key].sel(model="good", other="same"), -0.2, rtol=1e-12)
+        assert_allclose(found[key].sel(model="good", other="same"), -0.2, rtol=1e-12)
     pairs = {
         ("good", "same"): "better",
         ("same", "good"): "worse",
@@ -256,7 +255,7 @@ def test_medians_leave_out_what_is_not_judged():
     cells = rng.standard_normal((3, 8, 2))
     cells[0, :5], cells[1] = np.nan, np.nan
     found = median_of(cells)
-    np.testing.assert_allclose(found[[0, 2]], np.nanmedian(cells[[0, 2]], axis=1))
+    assert_allclose(found[[0, 2]], np.nanmedian(cells[[0, 2]], axis=1))
     assert np.isnan(found[1]).all()
 
 
@@ -305,5 +304,5 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
     forecast = truncated.forecast(plan.runs[window.run], window.start, window.steps)
     error = nrmse(predicted=forecast, measured=plan.runs[window.run])
     expected = [float(error[name]) for name in found.channels]
-    np.testing.assert_allclose(at["truncated_nrmse"].isel(window=2), expected, rtol=1e-6)
+    assert_allclose(at["truncated_nrmse"].isel(window=2), expected, rtol=1e-6)
     assert (at["seconds"] > 0).all()

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
@@ -273,5 +274,5 @@ def test_wave_drift_damping_is_aranhas(rig):
         for sign in (1, -1)
     ]
     # Differences of a curve whose slope changes within a few tenths of rad/s.
-    np.testing.assert_allclose(damping, (met[1] - met[0]) / (2 * drift), rtol=0.05)
-    np.testing.assert_allclose(force, mean_drift(rig, w, losses), rtol=1e-12)
+    assert_allclose(damping, (met[1] - met[0]) / (2 * drift), rtol=0.05)
+    assert_allclose(force, mean_drift(rig, w, losses), rtol=1e-12)
