@@ -264,7 +264,9 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        flat = input_map.columns.with_delayed(out.reshape(-1, out.shape[2]))
+        flat = out.reshape(-1, out.shape[2])
+        if input_map.observed is not None:
+            flat = input_map.observed.with_delayed(flat)
         return flat.reshape(stop - first, count, flat.shape[1])
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
