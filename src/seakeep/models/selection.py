@@ -267,7 +267,9 @@ class Problem:
         kept = np.concatenate([np.arange(every) < own, later, direct, means])
         pairs = sum(data.windows[run].columns for run in runs)
         factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
-        gram, right = system.gram.compress(kept, 0).compress(kept, 1), system.right[:, kept]
+        gram, right = system.gram, system.right
+        if not kept.all():
+            gram, right = gram.compress(kept, 0).compress(kept, 1), right[:, kept]
         path = ridge_path(gram, right, [factor * level for level in levels])
         path = spread_means(path, count, s, candidate.blocks)
         states = np.full(count * (candidate.state_reach + 1), not candidate.is_filter)
