@@ -338,7 +338,7 @@ CHANGES = {
         ("weighed(complete, errors, scale, given)", "weighed(complete, wider * errors, scale, given)", "models/test_live.py::test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known"),
         ("wider = np.where(worst > ALARM, worst, 1.0)", "wider = worst", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
         ("conditions.beyond**2)", "conditions.beyond)", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
-        ("own[:] = pd.Series(own).ffill()", "own[1:] = own[:-1]", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
+        ("own[:] = own[np.maximum.accumulate(last)]", "own[1:] = own[:-1]", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
         ("self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
         ("min(closed.dark, self._count.unseen)", "0", "models/test_live.py::test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead"),
         ("min(closed.dark, self._count.unseen)", "closed.dark", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),

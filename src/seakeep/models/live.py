@@ -19,7 +19,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 import xarray as xr
 from scipy import special
 
@@ -823,7 +822,8 @@ class Live:
                     f"that {steps} steps need. Give its plan: future = {{'{name}': …}}, or the "
                     "role 'constant'."
                 )
-            own[:] = pd.Series(own).ffill()
+            last = np.where(np.isfinite(own), np.arange(own.size), 0)
+            own[:] = own[np.maximum.accumulate(last)]
         inputs[begin - dark : begin, waves] = np.nan
         if not np.isnan(inputs).any():
             return inputs[None], math.inf, wanted

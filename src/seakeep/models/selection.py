@@ -908,17 +908,19 @@ def _rivalled(
     The better one is the best that errs less by more than the noise and does not grow.
     """
     # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
-    search, made, words = trials.search, trials.made, ""
+    search, words = trials.search, ""
     is_varied = "kind" in search.vary
+    both = trials if is_varied else replace(trials, made=dict(trials.made))
+    made = both.made
     own = {"ridge"} if is_varied else {"ridge", "observables"}
     plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
     before = {*made}
-    trials.judge(each.having(**plain) for each in kinds if search.given[2])
+    both.judge(each.having(**plain) for each in kinds if search.given[2])
     others = [each for each in made if each not in before]
     for other in sorted(others, key=lambda each: made[each].best):
         if made[taken].is_as_good_as(made[other]):
             continue
-        trials.refine([other])
+        both.refine([other])
         own_level = made[other].level(alike)
         if not trials.problem(other).grows(other, own_level):
             score = made[other].at(own_level)
@@ -928,9 +930,6 @@ def _rivalled(
             else:
                 trials.rival = other.having(ridge=own_level)
             break
-    if not is_varied:
-        for other in others:
-            del made[other]
     return taken, level, words
 
 
