@@ -169,7 +169,7 @@ CHANGES = {
         ("(here - centre) ** 2", "here**2", "models/test_following.py::test_a_step_is_the_equation"),
         ("np.array((1.0 - part, part))", "np.array((part, 1.0 - part))", "models/test_following.py::test_a_step_is_the_equation"),
         ("read *= on_grid - below", "read *= on_grid", "models/test_following.py::test_the_wave_is_read_where_the_vessel_goes"),
-        ("min(max(0.0, float(computed[N]) + still), highest)", "min(float(computed[N]) + still, highest)", "models/test_following.py::test_a_step_is_the_equation"),
+        ("min(max(0.0, float(computed[-1]) + still), highest)", "min(float(computed[-1]) + still, highest)", "models/test_following.py::test_a_step_is_the_equation"),
     ],
     "core/response.py": [
         ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_that_of_python_control"),

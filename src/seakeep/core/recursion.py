@@ -207,6 +207,10 @@ def recursion(
     on_states[:, N, models.column :: N][:, : len(place.taps)] = np.outer(
         models.gain / place.spacing, place.taps
     )
+    # A filter has no A: of its states the place alone is made.
+    is_filter = not models.on_states.any()
+    if is_filter:
+        on_states = on_states[:, N:]
     # D stands before B, and the square before what drives the step, where the next step writes.
     on_square = place.spacing**2 * models.on_square[..., None]
     on_inputs = np.concatenate([on_square, models.on_inputs], axis=2)
@@ -231,15 +235,16 @@ def recursion(
             computed = product(x[..., at : at + wide], a)
             # A run that is lost keeps a place; its states stay lost.
             if is_alone:
-                alone = min(max(0.0, float(computed[N]) + still), highest)
+                alone = min(max(0.0, float(computed[-1]) + still), highest)
                 read_row(flat, first + step * place.count, alone, u[to : to + n])
                 u[to - 1] = (alone - centre) ** 2
             else:
-                here = np.fmin(np.fmax(computed[..., N:] + still, 0.0), highest)
+                here = np.fmin(np.fmax(computed[..., -1:] + still, 0.0), highest)
                 u[..., to : to + n] = _between(flat, firsts + step * place.count, here)
                 u[..., to - 1 : to] = (here - centre) ** 2
             new = x[..., at - N : at]
-            new += computed[..., :N]
+            if not is_filter:
+                new += computed[..., :N]
             new += product(u[..., to - 1 : to + width], b)
     out = states[..., : steps * N].reshape(count, windows, steps, N)
     driving = inputs[..., 1 : 1 + steps * n].reshape(count, windows, steps, n)
