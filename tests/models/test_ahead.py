@@ -1,5 +1,7 @@
 """Forecasts beyond the waves that were measured: ``ahead="predict"``."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, RequestError
+from seakeep.baselines import Subspace
 from seakeep.models.engine import Windows
 from seakeep.models.growth import LeadErrors, weigh_members, weighed
 from seakeep.models.inputs import Scale
@@ -129,20 +132,35 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     assert np.all(np.ptp(every[:, -1], axis=0) > 0)  # a band stays where waves are predicted
 
 
-@pytest.mark.parametrize("positions", [True, False])
-def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
-    model, steps = model_of(drifts), 150
-    run = drift if positions else unplaced(drift)
-    squares, mean = np.zeros((2, steps)), model.state_scale.centre[1]
-    for at in range(300, 1300, 25):
+OWN_MEANS = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, centre="run")
+
+
+@pytest.mark.parametrize(
+    ("spec", "positions"),
+    [
+        (HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD), True),
+        (HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD), False),
+        (Subspace(4, 12, 1e-3, order=6, lead=LEAD), True),
+        (OWN_MEANS, True),
+        (replace(OWN_MEANS, alignment=FOLLOWED), True),
+    ],
+)
+def test_no_lead_errs_more_than_the_mean(drifts, drift, spec, positions):
+    model, steps = spec.fit(drifts, STATES, INPUTS), 150
+    run, zero = drift if positions else unplaced(drift), 0.0
+    if model.signature.input_map.reference:  # to whose own means it returns
+        run, zero = run.assign(heave=run.heave + 5.0), 5.0
+    squares, mean = np.zeros((2, steps)), model.signature.state_scale.centre[1] + zero
+    for at in range(max(300, model.history_samples), 1300, 25):
         start, true = float(run.time[at]), run.heave.values[at + 1 : at + 1 + steps]
         found = model.forecast(up_to(run, at), start, steps, ahead="predict")
         squares += (found.heave.values - true) ** 2, (mean - true) ** 2
     ratio = np.sqrt(squares[0] / squares[1])
-    # Unweighted, it is 1.4 and stays so.
+    # Unweighted, it is 1.1 to 1.4 and stays so.
     assert ratio.max() < 1.01
     assert ratio[:3].max() < 0.2
-    assert_allclose(found.heave.values[-20:], mean, atol=1e-12)
+    # Means before a start are not those of all of the run.
+    assert_allclose(found.heave.values[-20:], mean, atol=0.01 if zero else 1e-12)
 
 
 def test_where_waves_are_known_nothing_is_weighed(model):

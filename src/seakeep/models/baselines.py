@@ -20,6 +20,7 @@ from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import Model, counted
+from seakeep.models.growth import LeadErrors, lead_errors, stretches_of, weighed_runs
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
 from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
@@ -361,18 +362,26 @@ class Subspace(Plain):
         columns = sum(window.columns for window in data.windows)
         solution = Solution(space.A, "svd", float(spec.ridge) * columns, order)
         signature = data.signature
-        return SubspaceModel(
+        model = SubspaceModel(
             settings=replace(spec, order=order),
             space=space,
             signature=signature,
             training=data.training(solution),
             coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
         )
+        errors = lead_errors(
+            lambda windows, _: model._free_run(windows),
+            (signature.state_delays, signature.input_delays),
+            order + space.D.shape[1],
+            stretches_of(data, signature, named),
+        )
+        return replace(model, errors=errors)
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> SubspaceModel:
         """Rebuild the model that a file holds."""
-        return SubspaceModel(**unpack(dataset, space=StateSpace), **unpacked(dataset, cls))
+        own = unpack(dataset, space=StateSpace, errors=LeadErrors)
+        return SubspaceModel(**own, **unpacked(dataset, cls))
 
 
 @dataclass(frozen=True, eq=False)
@@ -391,6 +400,8 @@ class SubspaceModel(Model):
         Runs and windows.
     coverage : Coverage
         Waves that it was trained in.
+    errors : LeadErrors, optional
+        Its errors in training, which weigh forecasts from predicted waves.
     """
 
     settings: Subspace
@@ -398,12 +409,13 @@ class SubspaceModel(Model):
     signature: Signature = field(repr=False)
     training: Training
     coverage: Coverage = field(repr=False)
+    errors: LeadErrors | None = field(default=None, repr=False)
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        return [self._free_run(windows)[None] for windows in groups]
+        return weighed_runs(self, lambda own: [self._free_run(each)[None] for each in own], groups)
 
     def _free_run(self, windows: Windows) -> FloatArray:
         signature, histories = self.signature, windows.histories
@@ -439,7 +451,7 @@ class SubspaceModel(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
-        return packed(self, space=self.space)
+        return packed(self, space=self.space, errors=self.errors)
 
 
 RIVALS = FIR(0), ARX(0, 0), Subspace(0, 0, 0.1)

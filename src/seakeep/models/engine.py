@@ -114,6 +114,14 @@ class Windows:
     def __len__(self) -> int:
         return len(self.histories)
 
+    def departing(
+        self, measured: FloatArray, zero: FloatArray | float
+    ) -> tuple[Windows, FloatArray]:
+        """The windows, and what is measured in them less `zero`, as departures from their means."""
+        if self.zero is None:
+            return self, measured
+        return replace(self, zero=None), measured + (zero - self.zero)[:, None]
+
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
@@ -452,11 +460,10 @@ def filled(
 ) -> tuple[FloatArray, int]:
     """Inputs with what is missing from a sample on, and the first sample that is.
 
-    As :func:`seakeep.signals.prediction.fill_future`, without departures for a model of departures
-    from means before a start, which holds no errors to weigh them by.
+    As :func:`seakeep.signals.prediction.fill_future`.
     """
     futures, first, _ = fill_future(values, known, foresight(signature, run))
-    return futures[:1] if signature.input_map.reference else futures, first
+    return futures, first
 
 
 def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Foreseen]:

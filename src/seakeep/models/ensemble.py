@@ -41,13 +41,13 @@ from seakeep.models.forecasts import (
     windows_dataset,
     with_units,
 )
-from seakeep.models.growth import LeadErrors, Stretch, lead_errors, weigh_members
+from seakeep.models.growth import LeadErrors, Stretch, linear_errors, weigh_members
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.settings import HankelSettings
-from seakeep.models.training import TrainingArrays, TrainingData
+from seakeep.models.training import TrainingArrays, TrainingData, departing
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
@@ -661,11 +661,14 @@ class HankelEnsemble(Model):
     def errors(self) -> LeadErrors:
         """Errors of the members' mean on what they learnt from."""
         signature, arrays, members = self.signature, self.arrays, self._means
+        series: Any = zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
+        if signature.input_map.reference:
+            series = departing(series, signature.input_map)
         stretches = [
             Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
-            for x, u, v in zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
+            for x, u, v in series
         ]
-        return lead_errors(members, stretches, signature.readouts)
+        return linear_errors(members, stretches, signature.readouts)
 
     def _drawn(self, name: str) -> str:
         """A length as drawn, and in samples."""

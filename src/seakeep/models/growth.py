@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -72,7 +72,7 @@ class LeadErrors:
 
 
 class Source(NamedTuple):
-    """Where a stretch comes from, for free runs that are driven by the states they predict."""
+    """Where a stretch comes from, for free runs that read more of a run than the stretch holds."""
 
     signature: Signature
     name: str
@@ -91,7 +91,10 @@ class Stretch:
     first, last : int
         Samples between which forecasts may start and end.
     source : Source, optional
-        Run, and the instant of the first sample in s, where predicted states drive the input.
+        Run, and the instant of the first sample in s, where predicted states drive the input or
+        states depart from means before a start.
+    zero : ndarray, shape (N,), optional
+        What the states depart from.
     """
 
     states: FloatArray
@@ -100,6 +103,7 @@ class Stretch:
     first: int
     last: int
     source: Source | None = None
+    zero: FloatArray | float = 0.0
 
     def windows(self, starts: Sequence[int], s: int, z: int, steps: int) -> Windows:
         """What free runs from these samples read."""
@@ -117,23 +121,56 @@ class Stretch:
         )
 
 
-def lead_errors(
+Forecast = Callable[[Windows, Sequence[FittedReadOut]], FloatArray]
+"""States after windows, (window, steps, N), with what is read off them."""
+
+
+def linear_errors(
     members: Sequence[Dynamics],
     stretches: Sequence[Stretch],
     readouts: Sequence[FittedReadOut] = (),
 ) -> LeadErrors:
-    """Errors of the mean of members in their training runs.
+    """Errors of the mean of linear members in their training runs."""
+    own = [each.signature for each in members]
+    return lead_errors(
+        lambda windows, read_off: linear_runs(members, [windows], read_off)[0].mean(axis=0),
+        (max(each.state_delays for each in own), max(each.input_delays for each in own)),
+        float(np.mean([each.coefficients.shape[1] for each in members])),
+        stretches,
+        readouts,
+    )
+
+
+def lead_errors(
+    forecast: Forecast,
+    delays: tuple[int, int],
+    unknowns: float,
+    stretches: Sequence[Stretch],
+    readouts: Sequence[FittedReadOut] = (),
+) -> LeadErrors:
+    """Errors of forecasts in training runs.
 
     Residuals are those of the states as they are regressed; free runs are read off as forecasts
     are.
+
+    Parameters
+    ----------
+    forecast : callable
+        The model.
+    delays : tuple of int
+        s and z.
+    unknowns : float
+        Coefficients of an equation.
+    stretches : sequence of Stretch
+        What it learnt from.
+    readouts : sequence of FittedReadOut
+        Its read-outs.
     """
-    own = [each.signature for each in members]
-    delays = max(max(each.state_delays, each.input_delays) for each in own)
     longest = max(each.last - each.first for each in stretches)
-    steps = max(1, min(max(REACH * (delays + 1), LEAST), longest // 2))
-    residuals = _errors(members, stretches, 1, STEPS)[:, 0]
+    steps = max(1, min(max(REACH * (max(delays) + 1), LEAST), longest // 2))
+    residuals = _errors(forecast, delays, stretches, 1, STEPS)[:, 0]
     longest_first = sorted(stretches, key=lambda each: each.first - each.last)
-    errors = _errors(members, longest_first, steps, WINDOWS, readouts)
+    errors = _errors(forecast, delays, longest_first, steps, WINDOWS, readouts)
     known = np.isfinite(errors)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where all have diverged
         square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
@@ -143,24 +180,25 @@ def lead_errors(
     regressed = np.setdiff1d(np.arange(square.shape[1]), read_off)
     square[:1, regressed] = np.mean(residuals[:, regressed] ** 2, axis=0)
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
-    factor = _unseen(members, stretches)
+    factor = _unseen(unknowns, stretches)
     residual = factor * residuals.T @ residuals / len(residuals)
     return LeadErrors(residual, np.sqrt(factor * grown))
 
 
-def _unseen(members: Sequence[Dynamics], stretches: Sequence[Stretch]) -> float:
+def _unseen(unknowns: float, stretches: Sequence[Stretch]) -> float:
     """How much larger squared errors are in data that did not train (Akaike, 1970).
 
     The final prediction error of p coefficients found from n samples, (n + p)/(n − p) times the
     mean square of the residuals; at most three times, where a ridge makes up for what is missing.
     """
     n = sum(each.last - each.first for each in stretches)
-    p = min(np.mean([each.coefficients.shape[1] for each in members]), 0.5 * n)
-    return float((n + p) / (n - p))
+    p = min(unknowns, 0.5 * n)
+    return (n + p) / (n - p)
 
 
 def _errors(
-    members: Sequence[Dynamics],
+    forecast: Forecast,
+    delays: tuple[int, int],
     stretches: Sequence[Stretch],
     steps: int,
     most: int,
@@ -170,34 +208,39 @@ def _errors(
 
     Their starts are spread evenly over the stretches in which one fits.
     """
-    s = max(each.signature.state_delays for each in members)
-    z = max(each.signature.input_delays for each in members)
     room = [max(each.last - steps - each.first + 1, 0) for each in stretches]
     errors = []
     for each, count in zip(stretches, room, strict=True):
         if number := min(count, -(-most * count // max(sum(room), 1))):
             starts = np.linspace(each.first, each.last - steps, number).astype(int).tolist()
-            windows = each.windows(starts, s, z, steps)
-            mean = linear_runs(members, [windows], readouts)[0].mean(axis=0)
             measured = np.stack([each.states[at + 1 : at + steps + 1] for at in starts])
-            errors.append(mean - measured)
+            windows, measured = each.windows(starts, *delays, steps).departing(measured, each.zero)
+            errors.append(forecast(windows, readouts) - measured)
     return np.concatenate(errors)
 
 
-def training_errors(
-    dynamics: Dynamics,
-    data: TrainingData,
-    signature: Signature,
-    runs: Datasets,
-) -> LeadErrors:
-    """Errors of a single model in the runs that it was fitted to."""
-    stretches, source = [], None
+def stretches_of(data: TrainingData, signature: Signature, runs: Datasets) -> list[Stretch]:
+    """What a single model learnt from in the runs that it was fitted to."""
+    stretches, source, input_map = [], None, signature.input_map
     for number, (name, window) in enumerate(zip(data.names, data.windows, strict=True)):
-        if signature.input_map.follows is not None:
+        if input_map.follows is not None or input_map.reference:
             source = Source(signature, name, runs[name], data.begin(number))
+        first = window.first_column + input_map.reference
         own = data.physical(number)
-        stretches.append(Stretch(*own, window.first_column, window.last, source))
-    return lead_errors([dynamics], stretches, signature.readouts)
+        stretches.append(Stretch(*own, first, window.last, source, data.zero(number)))
+    return stretches
+
+
+def weighed_runs(
+    model: Any, run: Callable[[Sequence[Windows]], list[FloatArray]], groups: Sequence[Windows]
+) -> list[FloatArray]:
+    """Free runs of a single model over groups of windows, weighed where waves are predicted."""
+    runs = run(groups)
+    for values, windows in zip(runs, groups, strict=True):
+        if windows.departures and model.errors is not None:
+            parts = [values, *run(windows.departures)]
+            weigh_members(windows, parts, model.errors, model.signature.state_scale)
+    return runs
 
 
 def weighed(
@@ -270,8 +313,10 @@ def weigh_members(
     for number, first in enumerate(windows.predicted):
         whole = np.isfinite(parts[0][:, number]).all(axis=(1, 2))
         whole |= not whole.any()
+        zero = 0.0 if windows.zero is None else windows.zero[number]
+        own = replace(scale, centre=scale.centre + zero)
         for column in range(squares.shape[1] if first >= 0 else 0):  # one by one, for memory
             at = slice(column, column + 1)
             runs = np.stack([each[whole, number, :, at] for each in parts], axis=1)
-            mean, *_ = weighed(runs, squares[:, at], scale.part(at), steps < first)
+            mean, *_ = weighed(runs, squares[:, at], own.part(at), steps < first)
             parts[0][:, number, :, at] += mean - runs[:, 0].mean(axis=0)

@@ -19,7 +19,7 @@ from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name
-from seakeep.models.growth import LeadErrors, training_errors, weigh_members
+from seakeep.models.growth import LeadErrors, linear_errors, stretches_of, weighed_runs
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
@@ -52,8 +52,7 @@ class HankelDMDcModel(Model):
         Waves that it was trained in.
     learnt : (TrainingData, runs), LeadErrors or HankelDMDcModel, optional
         What it was fitted to, its errors there, or the varying model that it was taken from, whose
-        errors are its own. A member of an ensemble has none of them, nor has a model of departures
-        from the means before each start.
+        errors are its own. A member of an ensemble has none of them.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     variation : Variation, optional
@@ -88,7 +87,7 @@ class HankelDMDcModel(Model):
             signature=replace(signature, readouts=readouts),
             training=data.training(solution),
             coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
-            learnt=None if signature.input_map.reference else (data, runs),
+            learnt=(data, runs),
         )
 
     def __post_init__(self) -> None:
@@ -113,12 +112,15 @@ class HankelDMDcModel(Model):
             return self.learnt
         data, runs = self.learnt
         if self.variation is None:
-            return training_errors(self.dynamics, data, self.signature, runs)
+            return self._errors_in(data, runs)
         parts = data_by_value(data, runs, self.signature.parameter)
-        each = [(self.at(parameter=value), part) for value, part in parts.items()]
         return LeadErrors.together(
-            [training_errors(own.dynamics, part, own.signature, runs) for own, part in each]
+            [self.at(parameter=value)._errors_in(part, runs) for value, part in parts.items()]
         )
+
+    def _errors_in(self, data: TrainingData, runs: Datasets) -> LeadErrors:
+        stretches = stretches_of(data, self.signature, runs)
+        return linear_errors([self.dynamics], stretches, self.signature.readouts)
 
     @property
     def alignment(self) -> FittedAlignment | None:
@@ -211,12 +213,7 @@ class HankelDMDcModel(Model):
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         if self.variation is None or not all(each.parameters for each in groups):
             run = partial(linear_runs, [self.dynamics], readouts=self.signature.readouts)
-            runs = run(groups)
-            for values, windows in zip(runs, groups, strict=True):
-                if windows.departures and self.errors is not None:
-                    parts = [values, *run(windows.departures)]
-                    weigh_members(windows, parts, self.errors, self.state_scale)
-            return runs
+            return weighed_runs(self, run, groups)
         runs = [np.empty((1, len(each), each.steps, len(self.states))) for each in groups]
         for value in sorted({value for each in groups for value in each.parameters}):
             there = [np.array(each.parameters) == value for each in groups]

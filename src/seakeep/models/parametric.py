@@ -149,10 +149,14 @@ def regress_varying(
 def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
     """Training data of the runs at each value of a parameter."""
     values = [parameter_of(runs[name], parameter, name) for name in data.names]
-    per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs")
+    per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs", "zeros")
     out = {}
     for value in sorted(set(values)):
         there = [number for number, each in enumerate(values) if each == value]
-        cut: dict[str, Any] = {key: tuple(getattr(data, key)[n] for n in there) for key in per_run}
+        cut: dict[str, Any] = {
+            key: tuple(getattr(data, key)[n] for n in there)
+            for key in per_run
+            if getattr(data, key)
+        }
         out[value] = replace(data, **cut)
     return out

@@ -347,10 +347,8 @@ class Problem:
             for windows in read_groups(self.reader, self.runs, places):
                 starts = new[windows.steps]
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
-                if windows.zero is not None:
-                    measured += (data.zeros[run] - windows.zero)[:, None]
                 # Read-outs are learnt from departures.
-                found.append((starts, replace(windows, zero=None), measured))
+                found.append((starts, *windows.departing(measured, data.zero(run))))
             for old in list(self.read)[: len(self.read) - LAST + 1]:
                 self.read.pop(old, None)
             self.read[key] = found

@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, whole_number
-from seakeep.core.embedding import TrainingWindow
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
@@ -44,7 +43,7 @@ from seakeep.models.settings import (
     in_samples,
     periods_to_samples,
 )
-from seakeep.models.training import TrainingArrays, check_names, departures, gather, moments, until
+from seakeep.models.training import TrainingArrays, check_names, departing, gather, moments, until
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
 
@@ -819,9 +818,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
         series: Any = arrays.states, arrays.delayed, direct
         if shared.centre:
-            pieces = [each for each in zip(*series, strict=True) if len(each[0])]
-            whole = [TrainingWindow(0, len(each[0]), 0) for each in pieces]
-            series = zip(*departures(pieces, whole, input_map)[0], strict=True)
+            series = zip(*departing(zip(*series, strict=True), input_map), strict=True)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
         scales = [

@@ -91,6 +91,10 @@ class TrainingData:
     inputs: tuple[FloatArray, ...] = ()
     zeros: tuple[FloatArray, ...] = ()
 
+    def zero(self, run: int) -> FloatArray | float:
+        """What the states of a run depart from, physical units."""
+        return self.zeros[run] if self.zeros else 0.0
+
     def begin(self, run: int) -> float:
         """Instant of the first sample of a run's arrays, s."""
         return self.instants[run][0] - self.windows[run].first * self.signature.dt
@@ -316,6 +320,14 @@ def departures(
         out.append(tuple(values - mean for values, mean in zip(each, means, strict=True)))
         zeros.append(means[0])
     return tuple(out), tuple(zeros)
+
+
+def departing(
+    series: Iterable[Sequence[FloatArray]], input_map: InputMap
+) -> tuple[Sequence[FloatArray], ...]:
+    """Series of each run less their means; runs without samples are left out."""
+    every = [each for each in series if len(each[0])]
+    return departures(every, [TrainingWindow(0, len(each[0]), 0) for each in every], input_map)[0]
 
 
 @dataclass(frozen=True, eq=False)
