@@ -10,6 +10,7 @@ from records import record
 from scipy import signal
 
 from seakeep import HankelDMDc
+from seakeep.baselines import ARX
 from seakeep.models.conditions import disagreements
 
 DT, CHANNELS = 0.1, (["heave", "pitch"], ["eta"])
@@ -61,6 +62,11 @@ def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reaso
     # These runs state no water depth.
     assert "of a probe explains it" not in each.describe()
     assert ("water_depth in [rig]" in each.describe()) == (reason == "dynamics")
+
+
+def test_models_of_other_kinds_are_compared_too():
+    (each,) = found({"offset": 0.5}, ARX(6, 20, 1e-2, ridge_scale="per_snapshot"))
+    assert (each.run, each.reason) == ("odd", "offset")
 
 
 def test_another_unit_of_a_load_moves_its_mean_too():

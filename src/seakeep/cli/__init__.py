@@ -144,7 +144,7 @@ def main(arguments: list[str] | None = None) -> int:
         if status == INTERRUPTED:
             say(
                 "Interrupted. Finished files are kept. Run the same command again: a study goes on "
-                "where it stopped, and so does tune --resume; others start anew.",
+                "where it stopped, and so does tune; others start anew.",
                 style="red",
             )
         return status

@@ -18,7 +18,6 @@ from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.inputs import Scale
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import regular_periods
-from seakeep.models.specs import HankelDMDc
 from seakeep.signals import encounter_period
 from seakeep.signals.lags import parabola_peak
 from seakeep.waves import phase_speed
@@ -108,14 +107,14 @@ class Disagreement:
 
 
 def disagreements(
-    spec: HankelDMDc, runs: Datasets, states: Sequence[str], inputs: Sequence[str]
+    spec: Any, runs: Datasets, states: Sequence[str], inputs: Sequence[str]
 ) -> list[Disagreement]:
     """Compare a model of all runs with one per run, on data that neither learnt from.
 
     Parameters
     ----------
-    spec : HankelDMDc
-        Settings that leave nothing to be chosen.
+    spec : HankelSettings
+        Settings of a linear kind, which leave nothing to be chosen.
     runs : mapping of str to Dataset
         Training runs, cut at the end of their training windows.
     states, inputs : sequence of str
@@ -127,13 +126,13 @@ def disagreements(
         Runs in irregular waves that need a model of their own, the one that differs most first,
         each from those after it; empty for a single run, and where halves are too short.
     """
-    if len(runs) < 2 or not inputs or spec.parameter:  # then they differ on purpose
+    if len(runs) < 2 or not inputs:
         return []
-    spec = replace(spec, readouts=(), window=None, memory=0)  # a memory learns offsets of runs
+    spec = spec.having(readouts=(), window=None, memory=0)  # a memory learns offsets of runs
     at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
     halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
 
-    def fitted(names: Iterable[str], settings: HankelDMDc = spec) -> HankelDMDcModel:
+    def fitted(names: Iterable[str], settings: Any = spec) -> HankelDMDcModel:
         return settings.fit({name: halves[name] for name in names}, states, inputs)
 
     disagreeing: list[Disagreement] = []

@@ -147,7 +147,8 @@ def fit_campaign(
     if spec.standardize:
         _warn_of_slow_model(identified, runs)
     single: Any = identified.centre if is_ensemble(identified) else identified
-    if single is not None and single.settings.role == "model":
+    is_one = single is not None and not single.signature.parameter  # else runs differ on purpose
+    if is_one and single.settings.role == "model":
         for each in disagreements(single.settings, until(runs, stop), *channels):
             warn(each.describe())
     return identified
