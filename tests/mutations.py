@@ -502,6 +502,8 @@ CHANGES = {
     "signals/synchronisation.py": [
         ("_line(instants + lags.lag[good], instants,", "_line(instants - lags.lag[good], instants,", "campaign/test_steps.py::test_clocks_from_signals"),
         ("offset = level - drift * centre", "offset = level + drift * centre", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
+        ("math.sqrt(2) * getattr(clock, key)", "getattr(clock, key)", "signals/test_synchronisation.py::test_windows_that_share_a_half_are_not_counted_twice"),
+        ("low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series", "series", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
     ],
     "signals/tracking.py": [
         ('pitch = side * seen["panel_angle"]', 'pitch = seen["panel_angle"]', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
@@ -519,7 +521,9 @@ CHANGES = {
         ("known.sum(axis=0), np.nan", "len(known), np.nan", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
         ("lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_lead_reads_waves_ahead_of_time"),
-        ('run["time"] * clock', 'run["time"]', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('(clock * run[name])', 'run[name]', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('{"time", "diverged_at"} & set', '{"time"} & set', "signals/test_rigid_body.py::test_members_are_lost_at_instants_of_full_scale"),
+        ('"alignment_celerity"], "m/s")', '"alignment_celerity"], "m")', "signals/test_rigid_body.py::test_full_scale_run"),
         ("for each in (mean - truth, std)", "for each in (mean + truth, std)", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("y[at + 1 : at + steps + 1] for at", "y[at : at + steps] for at", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
     ],

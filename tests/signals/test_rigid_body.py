@@ -51,16 +51,40 @@ def test_words_and_density():
 
 def test_full_scale_run():
     run = xr.Dataset(
-        {"heave": ("time", [0.1, 0.2, 0.1], {"units": "m", "training_std": 0.05})},
+        {
+            "heave": (
+                "time",
+                [0.1, 0.2, 0.1],
+                {"units": "m", "training_std": 0.05, "accuracy": 1e-3},
+            )
+        },
         {"time": ("time", [0.0, 0.1, 0.2], {"units": "s"})},
-        {"dt": 0.1, "train_span": (0.0, 0.2), "water_depth": 3.6, "run": "a", "probe_offset": 0.3},
+        {"dt": 0.1, "train_span": (0.0, 0.2), "water_depth": 3.6, "run": "a", "probe_offset": 0.3}
+        | {"celerity": 2.5},
     )
     full = to_full_scale(run, 100.0)
     assert_allclose(full["time"], [0.0, 1.0, 2.0])
     assert_allclose(full["heave"], [10, 20, 10])
     assert full["heave"].attrs["training_std"] == 5.0
+    assert full["heave"].attrs["accuracy"] == 0.1
+    assert full.attrs["celerity"] == 25.0
     assert (full.attrs["dt"], full.attrs["train_span"]) == (1.0, (0.0, 2.0))
     assert full.attrs["probe_offset"] == 30.0
     assert (full.attrs["water_depth"], full.attrs["scale_factor"]) == (360.0, 100.0)
     with pytest.raises(RequestError, match="at full scale already"):
         to_full_scale(full, 100.0)
+
+
+def test_members_are_lost_at_instants_of_full_scale():
+    forecast = xr.Dataset(
+        {
+            "heave": (("member", "time"), np.ones((2, 2)), {"units": "m"}),
+            "status": ("member", ["ok", "diverged at t = 5.2 s"]),
+        },
+        {"time": ("time", [5.1, 5.2], {"units": "s"}), "diverged_at": ("member", [np.nan, 5.2])},
+        {"members": 2, "diverged": 1, "outside_training": "a height of 1 m", "status": ""},
+    )
+    full = to_full_scale(forecast, 100.0)
+    assert full["diverged_at"].values[1] == pytest.approx(52.0)
+    assert full["status"].values.tolist() == ["ok", "diverged at t = 52 s"]
+    assert full.attrs["outside_training"] == "at model scale: a height of 1 m"

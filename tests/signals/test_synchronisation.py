@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from seakeep.signals import Clock, clock_from_pulses, pool_drift
+from seakeep.signals import (
+    Clock,
+    clock_from_correlation,
+    clock_from_pulses,
+    clock_from_shared,
+    pool_drift,
+)
 from seakeep.signals.lags import _correlation
 from seakeep.signals.synchronisation import without_doubtful_drift
 
@@ -39,6 +45,43 @@ def test_pulses_give_offset_and_drift_with_honest_errors(rate, offset, drift, no
         )
     # The scatter of 20 normalised errors is 1 ± 0.16; within 3 of these.
     assert np.all(np.abs(np.std(misses, axis=0) - 1) < 0.5)
+
+
+def waves(seed):
+    rng = np.random.default_rng(seed)
+    omega, phase = 2 * np.pi * rng.uniform(0.3, 0.9, 12), rng.uniform(0, 2 * np.pi, 12)
+    return lambda t: np.cos(np.outer(t, omega) + phase).sum(axis=1) / np.sqrt(6)
+
+
+@pytest.mark.parametrize(
+    ("rates", "noises", "worst"),
+    [((50, 50), (0, 0.05), 1e-3), ((30, 500), (0.2, 0.02), 3e-3), ((80, 50), (0.05, 0.05), 1e-3)],
+)
+def test_a_shared_signal_gives_honest_errors_through_the_noise_of_both(rates, noises, worst):
+    # With the noise of both left in, errors are three to seven times what is claimed.
+    misses = []
+    for seed in range(12):
+        ours = logger(waves(seed), rates[0], 100.0, noises[0], seed, 0.3717, -40e-6)
+        reference = logger(waves(seed), rates[1], 100.0, noises[1], 50 + seed)
+        clock = clock_from_shared(3 * ours[0] + 1, ours[1], *reference)
+        read = clock.reading(clock.centre) - 0.3717 - (1 - 40e-6) * clock.centre
+        error = np.sqrt(clock.offset_error**2 - (clock.centre * clock.drift_error) ** 2)
+        assert abs(read) < worst
+        misses.append((read / error, (clock.drift + 40e-6) / clock.drift_error))
+    # The root mean square of 12 normalised errors is 1 ± 0.2.
+    assert np.all(np.abs(np.sqrt(np.mean(np.square(misses), axis=0)) - 1) < 0.6)
+
+
+def test_windows_that_share_a_half_are_not_counted_twice():
+    misses = []
+    for seed in range(25):
+        ours, readings = logger(waves(seed), 20.0, 200.0, 0.0, seed, 0.3, 20e-6)
+        other = waves(1000 + seed)(readings)  # what only one of them sees
+        reference = logger(waves(seed), 20.0, 200.0, 0.0, seed)
+        clock = clock_from_correlation(ours + 0.3 * other, readings, *reference, 20.0, 1.0)
+        misses.append((clock.drift - 20e-6) / clock.drift_error)
+    # The root mean square of 25 is 1 ± 0.14.
+    assert abs(np.sqrt(np.mean(np.square(misses))) - 1) < 0.42
 
 
 def test_pulses_down_lost_and_doubled():

@@ -16,12 +16,18 @@ import scipy
 from scipy.interpolate import CubicSpline
 
 from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_real
+from seakeep.core.spectra import autocorrelation
 from seakeep.errors import DataError, RequestError
+from seakeep.signals.filters import low_pass
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import record, stretches, uniform_step, usual_step
+from seakeep.signals.waves import noise_level, tapered_power
 
 LARGEST_DRIFT = 1e-3
 """Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
+
+SIGNAL = 0.99
+"""Part of what a signal has above its noise that is compared where two loggers record it."""
 
 ASSUMED = "assumed the same as the reference's"
 """Method of a clock of which nothing is known."""
@@ -272,7 +278,10 @@ def clock_from_correlation(
             "larger lag."
         )
     instants = begin + lags.centre[good]
-    return _line(instants + lags.lag[good], instants, 0 * instants, "correlation of windows")
+    clock = _line(instants + lags.lag[good], instants, 0 * instants, "correlation of windows")
+    # Neighbours share a half, so that two windows count as one.
+    errors = {key: math.sqrt(2) * getattr(clock, key) for key in ("offset_error", "drift_error")}
+    return replace(clock, **errors)
 
 
 def clock_from_shared(
@@ -286,7 +295,8 @@ def clock_from_shared(
     """Clock of a logger from one signal that it and the reference both record.
 
     The lags of windows give a first value; least squares over all samples, in which offset and
-    drift of the clock and gain and level of the signal are free, refine it.
+    drift of the clock and gain and level of the signal are free, refine it. What lies above the
+    frequencies of the signal is noise, and is removed from both records before.
 
     Parameters
     ----------
@@ -310,6 +320,9 @@ def clock_from_shared(
     turned = usual_step(c) < usual_step(t)  # the spline is of the faster one
     if turned:
         (a, c), (b, t), offset, rate = (b, t), (a, c), -offset / rate, 1 / rate
+    # Noise between samples is less than at them, which would draw the instants there.
+    edge = max(_highest_frequency(x, usual_step(times)) for x, times in ((a, c), (b, t)))
+    a, b = (_below(edge, x, usual_step(times)) for x, times in ((a, c), (b, t)))
     other = CubicSpline(t, b)
     centre = float(c.mean())
     for _ in range(6):
@@ -323,18 +336,30 @@ def clock_from_shared(
         offset, rate = float(offset + shift - stretch * centre), float(rate + stretch)
         if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
             break
-    # Samples of a residual that is itself a wave count less than once each.
-    power = float(left @ left)
-    whiteness = float(left[1:] @ left[:-1]) / max(power, 1e-300)
-    inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
-    level_error, drift_error = (errors * inflation).tolist()
-    rms = float(np.sqrt(power / left.size) / (abs(gain) * np.std(slope) + 1e-300))
+    # Samples of a residual that goes with the slope, as both are waves, count less than once each.
+    lags = min(round(window / usual_step(c)), left.size // 2)
+    together = np.prod([autocorrelation([x[:, None]], lags) for x in (left, slope)], axis=0)[:, 0]
+    summed = np.linspace(2.0, 0.0, lags + 1)[1:] @ np.nan_to_num(together[1:])
+    level_error, drift_error = (errors * np.sqrt(max(1.0 + summed, 1.0))).tolist()
+    rms = float(np.sqrt(left @ left / left.size) / (abs(gain) * np.std(slope) + 1e-300))
     if turned:
         offset, rate = -offset / rate, 1 / rate
     offset_error = float(np.hypot(level_error, centre * drift_error))
     return Clock(
         offset, rate - 1, offset_error, drift_error, "shared channel", left.size, rms, centre=centre
     )
+
+
+def _highest_frequency(series: FloatArray, dt: float) -> float:
+    """Frequency below which nearly all lies that a signal has above its noise, Hz."""
+    power = tapered_power(series)
+    grown = np.cumsum(power - noise_level(power))
+    return float(np.argmax(grown >= SIGNAL * grown.max()) / (series.size * dt))
+
+
+def _below(edge: float, series: FloatArray, dt: float) -> FloatArray:
+    """Series without what lies far above a frequency, as far as it was sampled there."""
+    return low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series
 
 
 def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:

@@ -3,6 +3,7 @@
 Whether a test input repeats a training input, which makes the test meaningless.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -604,8 +605,13 @@ def noise_floor(series: ArrayLike) -> float:
     x = scipy.signal.detrend(over_gaps(x))
     taper = np.hanning(x.size)
     power = np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)
+    return math.sqrt(noise_level(power))
+
+
+def noise_level(power: FloatArray) -> float:
+    """Level of white noise in a spectrum from 0 to the Nyquist frequency."""
     low, high = (round(edge * (power.size - 1)) for edge in NOISE_BAND)
-    return float(np.sqrt(np.median(power[low:high]) / np.log(2.0)))
+    return float(np.median(power[low:high]) / np.log(2.0))
 
 
 REPEATED = 0.9

@@ -528,10 +528,13 @@ def _seconds(
     return length.value * (next(known, None) or campaign.encounter_period())
 
 
-TIMES = {"dt", "start", "encounter_period", "train_span", "test_span", "reads_input_until",
-         "input_predicted_from", "diverged_at"}  # fmt: skip
-LENGTHS = {"water_depth", "probe_offset", "probe_offset_spread"}
-"""Attributes of a run that are times and lengths."""
+SCALED = {
+    **dict.fromkeys(["dt", "start", "encounter_period", "train_span", "test_span",
+                     "reads_input_until", "input_predicted_from", "diverged_at"], "s"),
+    **dict.fromkeys(["water_depth", "probe_offset", "probe_offset_spread"], "m"),
+    **dict.fromkeys(["celerity", "alignment_celerity"], "m/s"),
+}  # fmt: skip
+"""Units of attributes of a run, or of a forecast."""
 
 
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
@@ -574,16 +577,19 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         return froude_factor(unit or "1", scale, density_ratio), unit
 
     clock, _ = factor_of("s")
-    out = _scaled(run, factor_of).assign_coords(time=run["time"] * clock)
-    out["time"].attrs = dict(run["time"].attrs)
+    out = _scaled(run, factor_of)
+    for name in {"time", "diverged_at"} & set(run.coords):
+        out[name] = (clock * run[name]).assign_attrs(run[name].attrs)
     for variable in out.data_vars.values():
         if "x_position" in variable.attrs:
             variable.attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
-    for key in (TIMES | LENGTHS) & run.attrs.keys():
-        by, value = clock if key in TIMES else scale, run.attrs[key]
+    for key in SCALED.keys() & run.attrs.keys():
+        by, value = factor_of(SCALED[key])[0], run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+    if "outside_training" in run.attrs:
+        out.attrs["outside_training"] = f"at model scale: {run.attrs['outside_training']}"
     if "status" in run.attrs:  # it names instants, and so does that of each member
         dt = float(np.diff(out["time"].values[:2]).sum())
         out.attrs["status"] = status_text(out.attrs, dt)
@@ -598,14 +604,14 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
 
 
 def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> xr.Dataset:
-    """Multiply channels, and the standard deviations among their attributes, by their factors."""
+    """Multiply channels, and the deviations among their attributes, by their factors."""
     out = run.copy()
     for name, channel in run.data_vars.items():
         unit = str(channel.attrs.get("units", ""))
         factor, shown = factor_of(unit)
         if factor == 1.0 or channel.dtype.kind not in "fiu":
             continue
-        known = {"training_std", "noise_std"} & set(channel.attrs)
+        known = {"training_std", "noise_std", "accuracy"} & set(channel.attrs)
         spreads = {key: factor * float(channel.attrs[key]) for key in known}
         out[name] = (channel * factor).assign_attrs(
             channel.attrs | spreads | ({"units": shown} if unit else {})
