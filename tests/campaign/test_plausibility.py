@@ -190,8 +190,24 @@ def test_a_test_part_without_samples_is_an_error(loggers, test):
     """It would else be judged on the part that trains."""
     campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
     message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
-    with pytest.warns(SeakeepWarning, match="mru ends"), pytest.raises(DataError, match=message):
+    with pytest.raises(DataError, match=message):
         campaign.prepare()
+
+
+@pytest.mark.parametrize(
+    ("role", "places"),
+    [("span = [2, 13]", []), ("span = [0, 13]", [0.4]), ("span = [2, inf]", [13.8]),
+     ("span = [14, inf]", [13.98])],
+)  # fmt: skip
+def test_faults_outside_the_span_are_none_of_the_run(changed, tank, role, places):
+    """Outliers at 0.4 s, a pitch that sticks from 13.8 s on: seen from a sample before the span."""
+    columns = tank_columns(1)
+    columns["Heave [mm]"][20:22] = 900
+    columns["Pitch (deg)"][690:] = columns["Pitch (deg)"][690]
+    write_csv(tank / "second.csv", columns)
+    run = changed(("span = [2, 18]", role)).prepare(["second"])["second"]
+    flagged = [each for each in findings_of(run) if each.kind.name in ("OUTLIERS", "STUCK")]
+    assert [each.place for each in flagged] == pytest.approx(places)
 
 
 COUNTED = ("sampling_rate = 10", "steps_per_period = 12")

@@ -25,7 +25,7 @@ from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
-FORMAT = 12
+FORMAT = 13
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
@@ -390,9 +390,9 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
+                run = cropped(resampled(run, dt))
+                run = checked(run, surveyed.doubts.get(name), surveyed.left_out)
                 warn_of(run.findings, reported)
-                run = cropped(run)
                 data = run.data
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
