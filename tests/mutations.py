@@ -422,11 +422,13 @@ CHANGES = {
         ("1.0 - weights @ power[1:] / power[0]", "weights @ power[1:] / power[0]", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
         ("(high - low) / 3.29", "(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
     ],
-    "quality/probes.py": [
-        ("float(np.sign(alike) * size)", "float(size)", "quality/test_probes.py::test_another_unit_sign_or_gain"),
-        ("1 / gain if is_first else gain", "gain", "quality/test_probes.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
-        ("2 * len(beyond) > len(gains)", "beyond", "quality/test_probes.py::test_another_unit_sign_or_gain"),
-        ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+    "quality/runs.py": [
+        ("float(np.sign(alike) * size)", "float(size)", "quality/test_runs.py::test_another_unit_sign_or_gain"),
+        ("if begin < end and", "if", "campaign/test_plausibility.py::test_runs_that_use_the_same_part_of_equal_files"),
+        ("files[0] & files[1]", "files[0] == files[1]", "campaign/test_plausibility.py::test_a_logger_s_file_that_stands_in_two_runs"),
+        ("1 / gain if is_first else gain", "gain", "quality/test_runs.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
+        ("2 * len(beyond) > len(gains)", "beyond", "quality/test_runs.py::test_another_unit_sign_or_gain"),
+        ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_runs.py::test_another_unit_sign_or_gain"),
     ],
     "quality/samples.py": [
         ("GRAVITY * period**2 / (2 * np.pi)", "GRAVITY * period / (2 * np.pi)", "quality/test_checks.py::test_waves_that_none_of_their_period_is"),

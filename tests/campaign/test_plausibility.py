@@ -72,6 +72,37 @@ def loggers(tmp_path):
     return write
 
 
+@pytest.mark.parametrize(
+    ("spans", "shared"),
+    [("train = [0, 10]\ntest = [10, inf]", (2.0, 18.0)), ("role = 'train'", (2.0, 18.0)),
+     ("role = 'train'\nspan = [0, 2]", None)],
+)  # fmt: skip
+def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared):
+    """The test run, of 2 s to 18 s, is a copy of the other."""
+    (tank / "second.csv").write_bytes((tank / "first.csv").read_bytes())
+    whole = "train = [0, 10]\ntest = [10, inf]"
+    campaign = changed((whole, spans))
+    words = (
+        r"^second: file is one of first too, and both use it from 2 s to 18 s\. Correct it in \["
+    )
+    with pytest.warns(SeakeepWarning, match=words) if shared else nullcontext():
+        runs = campaign.prepare()
+    found = [each for each in findings_of(runs["second"]) if each.kind.name == "FILE"]
+    assert [(each.place, each.value) for each in found] == ([shared] if shared else [])
+
+
+def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
+    campaign = loggers()
+    text = campaign.path.read_text("utf-8")
+    write_csv(
+        tmp_path / "probes_2.csv", {n: tank_columns(1)[n] for n in ("Time [s]", "WP fwd [mm]")}
+    )
+    copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
+    campaign.path.write_text(text.replace("[preparation]", copied), "utf-8")
+    with pytest.warns(SeakeepWarning, match="^second: file is one of first too"):
+        assert "file" in kinds(read_campaign(campaign.path).prepare()["second"])
+
+
 # What is assumed or contradicted about instants is a finding.
 
 
