@@ -29,8 +29,14 @@ CHANGES = {
     "campaign/derivation.py": [
         ("rotation_matrix(angles)[:, 2, axis]", "rotation_matrix(angles)[:, axis, 2]", "campaign/test_steps.py::test_gravity_is_removed_from_one_accelerometer"),
     ],
+    "campaign/guesses.py": [
+        ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
+        ("noise_share(series) > 0.5", "noise_share(series) > 2", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
+        ('"time" in _kinds(_words(column)) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
+    ],
     "campaign/pipeline.py": [
         ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ("groups[name] = group.sel(", "groups[name] = group; group.sel(", "campaign/test_plausibility.py::test_faults_outside_the_span_are_none_of_the_run"),
         ("own > MOST_FINER * dt", "own < MOST_FINER * dt", "campaign/test_prepare.py::test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one"),
         ("time = origin + dt * np.arange(first, last + 1)", "time = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
         ("rtol=1e-6, atol=0), np.nan", "rtol=0, atol=0), np.nan", "campaign/test_prepare.py::test_a_number_for_no_reading_is_a_gap_of_channels_alone"),
@@ -214,6 +220,8 @@ CHANGES = {
     ],
     "formats/matlab.py": [
         ("return 1.0 / value if key in", "return float(value) if key in", "formats/test_read_binary.py::test_matlab"),
+        ("max(sizes, key=sizes.count)", "max(sizes)", "formats/test_read_binary.py::test_what_stands_beside_the_channels_of_a_matlab_file"),
+        ("_length(value) == longest]", "isinstance(value, dict)]", "formats/test_read_binary.py::test_what_stands_beside_the_channels_of_a_matlab_file"),
     ],
     "formats/rosbag.py": [
         ("int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)", "int(stamp.sec) * 1_000_000_000", "formats/test_read_rosbag.py::test_a_standard_message"),
@@ -416,11 +424,13 @@ CHANGES = {
         ("1.0 - weights @ power[1:] / power[0]", "weights @ power[1:] / power[0]", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
         ("(high - low) / 3.29", "(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
     ],
-    "quality/probes.py": [
-        ("float(np.sign(alike) * size)", "float(size)", "quality/test_probes.py::test_another_unit_sign_or_gain"),
-        ("1 / gain if is_first else gain", "gain", "quality/test_probes.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
-        ("2 * len(beyond) > len(gains)", "beyond", "quality/test_probes.py::test_another_unit_sign_or_gain"),
-        ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+    "quality/runs.py": [
+        ("float(np.sign(alike) * size)", "float(size)", "quality/test_runs.py::test_another_unit_sign_or_gain"),
+        ("if begin < end and", "if", "campaign/test_plausibility.py::test_runs_that_use_the_same_part_of_equal_files"),
+        ("files[0] & files[1]", "files[0] == files[1]", "campaign/test_plausibility.py::test_a_logger_s_file_that_stands_in_two_runs"),
+        ("1 / gain if is_first else gain", "gain", "quality/test_runs.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
+        ("2 * len(beyond) > len(gains)", "beyond", "quality/test_runs.py::test_another_unit_sign_or_gain"),
+        ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_runs.py::test_another_unit_sign_or_gain"),
     ],
     "quality/samples.py": [
         ("GRAVITY * period**2 / (2 * np.pi)", "GRAVITY * period / (2 * np.pi)", "quality/test_checks.py::test_waves_that_none_of_their_period_is"),

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy import io
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
+from seakeep.errors import RequestError
 
 
 def drafted(folder, files):
@@ -82,6 +84,30 @@ def test_a_draft_asks_whether_slow_files_count_milliseconds(tmp_path):
         text, _ = drafted_of(tmp_path, wave)
         assert f"# the files have {rate} samples per second" in text
         assert ("time_unit = 'ms'" in text) is asks
+
+
+@pytest.mark.parametrize(
+    ("header", "factor"), [("t_DAQ", 1), ("QTM_time", 1), ("DAQ time_ms", 1e3)]
+)
+def test_times_that_jitter_are_told_by_a_word_of_their_name(tmp_path, header, factor):
+    """A carriage that moves evenly before them in the file is none."""
+    columns = tank_columns()
+    even = columns.pop("Time [s]")
+    jitter = np.random.default_rng(0).uniform(-0.004, 0.004, even.size)
+    content = {"carriage": 1.5 * even, header: factor * (even + jitter), **columns}
+    text, campaign = drafted_of(tmp_path, content)
+    assert campaign.settings.files.time == header
+    assert campaign.settings.files.sampling_rate is None
+    assert "# the files have 50.0" in text
+
+
+def test_a_draft_of_structs_says_how_to_save_them(tmp_path):
+    t = 0.02 * np.arange(1000)
+    io.savemat(tmp_path / "run.mat", {"time": t, "waves": {"eta": t}, "motion": {"heave": t}})
+    with pytest.raises(
+        RequestError, match=r"'waves' is a struct .*\. Save .* one struct of vectors"
+    ):
+        draft_campaign([tmp_path / "run.mat"])
 
 
 def test_a_draft_without_waves_says_so(tmp_path):
@@ -187,9 +213,27 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
         "a0": "train", "a1": "train", "a2": "test", "b0": "test", "c_decay": "unused"
     }  # fmt: skip
     assert 'waves = "regular" # guessed from its spectrum' in text
-    assert 'role = "unused" # guessed: no waves were found, as in still water or decay' in text
+    assert 'role = "unused" # guessed: no waves were found, as in still water, decay tests' in text
     text, _ = drafted(tmp_path, [files[0], files[-1]])
     assert 'role = "train" # the only run to train on\n' in text
+
+
+@pytest.mark.parametrize(
+    ("dead", "beside"),
+    [("constant", True), ("noise", True), ("hum", True), ("constant", False), ("noise", False)],
+)
+def test_a_dead_probe_shows_no_waves_and_drives_nothing(tmp_path, dead, beside):
+    """Mains hum of 50 Hz at 50 samples per second is as slow as a wave."""
+    columns = tank_columns(0, 60.0)
+    t, heave = columns["Time [s]"], columns["Heave [mm]"]
+    series = {"constant": 0 * t + 3, "noise": np.random.default_rng(0).normal(0, 0.2, t.size),
+              "hum": 0.2 * np.sin(2 * np.pi * 50.3 * t)}  # fmt: skip
+    waves = {"WP 1 [mm]": series[dead]} | ({"WP 2 [mm]": columns["WP fwd [mm]"]} if beside else {})
+    text, campaign = drafted_of(tmp_path, {"Time [s]": t, **waves, "Heave [mm]": heave})
+    assert campaign.settings.runs["run"].waves == ("irregular" if beside else None)
+    assert campaign.model().inputs == (("eta_2",) if beside else ("eta_1",))
+    assert ("# eta_1 left out: next to no motion beside the others" in text) is beside
+    assert ("STATE IT: no wave was found" in text) is not beside
 
 
 def rigged(folder, name, period, height, seed, begin=12.0):

@@ -72,6 +72,37 @@ def loggers(tmp_path):
     return write
 
 
+@pytest.mark.parametrize(
+    ("spans", "shared"),
+    [("train = [0, 10]\ntest = [10, inf]", (2.0, 18.0)), ("role = 'train'", (2.0, 18.0)),
+     ("role = 'train'\nspan = [0, 2]", None)],
+)  # fmt: skip
+def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared):
+    """The test run, of 2 s to 18 s, is a copy of the other."""
+    (tank / "second.csv").write_bytes((tank / "first.csv").read_bytes())
+    whole = "train = [0, 10]\ntest = [10, inf]"
+    campaign = changed((whole, spans))
+    words = (
+        r"^second: file is one of first too, and both use it from 2 s to 18 s\. Correct it in \["
+    )
+    with pytest.warns(SeakeepWarning, match=words) if shared else nullcontext():
+        runs = campaign.prepare()
+    found = [each for each in findings_of(runs["second"]) if each.kind.name == "FILE"]
+    assert [(each.place, each.value) for each in found] == ([shared] if shared else [])
+
+
+def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
+    campaign = loggers()
+    text = campaign.path.read_text("utf-8")
+    write_csv(
+        tmp_path / "probes_2.csv", {n: tank_columns(1)[n] for n in ("Time [s]", "WP fwd [mm]")}
+    )
+    copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
+    campaign.path.write_text(text.replace("[preparation]", copied), "utf-8")
+    with pytest.warns(SeakeepWarning, match="^second: file is one of first too"):
+        assert "file" in kinds(read_campaign(campaign.path).prepare()["second"])
+
+
 # What is assumed or contradicted about instants is a finding.
 
 
@@ -190,8 +221,24 @@ def test_a_test_part_without_samples_is_an_error(loggers, test):
     """It would else be judged on the part that trains."""
     campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
     message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
-    with pytest.warns(SeakeepWarning, match="mru ends"), pytest.raises(DataError, match=message):
+    with pytest.raises(DataError, match=message):
         campaign.prepare()
+
+
+@pytest.mark.parametrize(
+    ("role", "places"),
+    [("span = [2, 13]", []), ("span = [0, 13]", [0.4]), ("span = [2, inf]", [13.8]),
+     ("span = [14, inf]", [13.98])],
+)  # fmt: skip
+def test_faults_outside_the_span_are_none_of_the_run(changed, tank, role, places):
+    """Outliers at 0.4 s, a pitch that sticks from 13.8 s on: seen from a sample before the span."""
+    columns = tank_columns(1)
+    columns["Heave [mm]"][20:22] = 900
+    columns["Pitch (deg)"][690:] = columns["Pitch (deg)"][690]
+    write_csv(tank / "second.csv", columns)
+    run = changed(("span = [2, 18]", role)).prepare(["second"])["second"]
+    flagged = [each for each in findings_of(run) if each.kind.name in ("OUTLIERS", "STUCK")]
+    assert [each.place for each in flagged] == pytest.approx(places)
 
 
 COUNTED = ("sampling_rate = 10", "steps_per_period = 12")

@@ -13,6 +13,7 @@ from scipy import io
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
 from seakeep.errors import DataError
+from seakeep.formats import read_columns
 
 T = np.arange(200) * 0.05
 HEAVE, WAVE = np.sin(T), np.cos(T)
@@ -55,6 +56,39 @@ def test_matlab(tmp_path, content, save):
     # A step of 0.05 turned into a rate and back: rounding.
     assert_allclose(run["time"], T, rtol=1e-15)
     check(run.assign_coords(time=T))
+
+
+SOUND = {"time": T, **BOTH}
+GAINS = {"gains": np.ones(7)}
+LIST = {"units": np.array(["s", "mm", "m"], dtype=object)}
+
+
+@pytest.mark.parametrize(
+    ("content", "fault", "words"),
+    [
+        ({**SOUND, **GAINS}, "gains", "'gains' has 7 values, and the time 200. Save channels of"),
+        ({"run": SOUND, **GAINS}, "gains", "'gains' has 7 values, and the time 200"),
+        ({"time": T, **UNTIMED, **GAINS}, "gains", "'gains' has 7 values, and the time 200"),
+        ({"dt": 0.05, **BOTH, **GAINS}, "gains", "'gains' has 7 values, and most 200"),
+        ({"dt": 0.05, **BOTH, "f": np.ones(300)}, "f", "'f' has 300 values, and most 200"),
+        ({"t_DAQ": T, "early": T[1:], **BOTH}, "early", "has 199 values, and most 200"),
+        ({**SOUND, "loads": {"bow": T}}, "loads", "'loads' is a struct beside other channels. Sa"),
+        ({"run": SOUND, "about": {"gains": np.ones(7)}}, "about", "'about' is a struct beside"),
+        ({**SOUND, **LIST}, "units", "'units' lists 3 units, and no list says of which columns"),
+        ({"run": SOUND, "about": {"date": "1 May"}}, None, ""),
+    ],
+)
+@pytest.mark.parametrize("save", [io.savemat, matlab73])
+def test_what_stands_beside_the_channels_of_a_matlab_file(tmp_path, content, fault, words, save):
+    """It is no channel, and stops none: a fault says what to do."""
+    save(tmp_path / "run.mat", content)
+    table = read_columns(tmp_path / "run.mat")
+    assert_array_equal(table.values["heave"], HEAVE)
+    assert_array_equal(table.values["wave"], WAVE)
+    assert list(table.faults) == ([fault] if fault else [])
+    if fault:
+        assert fault not in table.values
+        assert words in table.faults[fault]
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])

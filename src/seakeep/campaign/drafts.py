@@ -83,9 +83,10 @@ def draft_campaign(
                     "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
                     "RUN_LOGGER.csv."
                 )
+        mend = "Check delimiter and decimal mark of the file."
         raise RequestError(
             f"{first.path}: no column has numbers that a channel could be made of (columns: "
-            f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
+            f"{', '.join(first.table.names)}). {next(iter(first.table.faults.values()), mend)}"
         )
     wave = next(iter(_inputs(guesses)), None)
     seas = seas_of(read, guesses, wave) if wave else {}
@@ -155,8 +156,8 @@ def _roles(
     roles, whole = {}, []
     for name in runs:
         why = (
-            "guessed: no waves were found, as in still water or decay tests. With waves = 'still' "
-            "and role = 'test' check judges a decay"
+            "guessed: no waves were found, as in still water, decay tests or by a dead probe. With "
+            "waves = 'still' and role = 'test' check judges a decay"
         )
         if lacking := loggers - {file.logger for file in files if file.run == name}:
             why = f"it has no file of {', '.join(sorted(lacking))}"
@@ -215,9 +216,9 @@ def _relative(path: Path, folder: Path | str | None) -> str:
 
 
 def _inputs(guesses: Guesses) -> list[Guess]:
-    """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
+    """Wave probes that drive a model: none that is behind the vessel, is dead or has more gaps."""
     waves = [guess for guess in guesses if is_elevation(guess.channel)]
-    before = [guess for guess in waves if not guess.behind] or waves
+    before = [guess for guess in waves if not (guess.behind or guess.at_rest)] or waves
     least = min((guess.gaps for guess in before), key=("", "short", "long").index, default="long")
     return [guess for guess in before if guess.gaps == least]
 
@@ -241,7 +242,7 @@ def _channels(guesses: Guesses) -> dict[str, Any]:
         "states": states,
         "moved": any(moved),
         "headed": not all(guess.column.isdigit() for guess in guesses),
-        "still": [name for name in motions if mapped[name].at_rest],
+        "still": [name for name in (*motions, *probes) if mapped[name].at_rest],
         "gapped_motions": [name for name in motions if mapped[name].gaps == "long"],
         "loads": [n for n in rest if n.startswith("mooring_") and n not in states],
         "inputs": inputs,

@@ -23,6 +23,7 @@ from seakeep.conventions import (
 from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
+from seakeep.quality.faults import noise_share
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, first_wave, tapered_power
@@ -44,7 +45,8 @@ SHORT_GAP = 0.25
 """Seconds: what ``gaps = "bridge"`` fills unless ``longest_gap`` says otherwise."""
 
 AT_REST = 0.05
-"""Part of the largest motion of its unit below which one is restrained; head seas leave 0.02."""
+"""Part of the largest motion or wave of its unit below which one is restrained, or its sensor dead;
+head seas leave 0.02."""
 
 HYSTERESIS = 0.3
 """Standard deviations that a wave must pass where noise leads the count."""
@@ -102,8 +104,8 @@ class Guess:
     """A guess for a column; `channel` is empty where nothing fits, and `why` says so.
 
     `unit_from` says who states the unit: the file, the end of the column's name, or nobody.
-    `at_rest` says that the motion is restrained or does not show, `behind` that a probe's name
-    places it behind the vessel.
+    `at_rest` says that the motion or the wave does not show beside others, `behind` that a probe's
+    name places it behind the vessel.
     """
 
     column: str
@@ -177,6 +179,8 @@ def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
 def _sea(file: File, series: FloatArray) -> Sea | None:
     step = 1.0 / (file.rate or 1.0)
     try:
+        if noise_share(series) > 0.5:
+            return None
         series = series[waves_part(series, step)]
         power = tapered_power(series)
         frequency = np.fft.rfftfreq(series.size, step)
@@ -319,16 +323,17 @@ def guess_channels(files: Files) -> list[Guess]:
                 guess = _guess(column, same)
                 name = guess.channel and _free(guess.channel, taken)
                 out.append(replace(guess, channel=name))
-    # Motions, rates and accelerations beside which others of their unit move far more.
+    # Motions and waves beside which others of their unit move far more.
     sizes = {}
     for guess in out:
-        if guess.is_motion:
+        if guess.is_motion or is_elevation(guess.channel):
             series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
             spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
             unit = si_unit(guess.unit)
-            sizes[guess.channel] = unit, max(map(np.ptp, spans)) * conversion(guess.unit, unit)
-    largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
-    rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}
+            size = max(map(np.ptp, spans)) * conversion(guess.unit, unit)
+            sizes[guess.channel] = (unit, guess.is_motion), size
+    largest = {kind: max(x for k, x in sizes.values() if k == kind) for kind, _ in sizes.values()}
+    rests = {name for name, (kind, size) in sizes.items() if size <= AT_REST * largest[kind]}
     return [replace(each, at_rest=each.channel in rests) for each in out]
 
 
@@ -373,8 +378,8 @@ def _printable(text: str) -> str:
 
 def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]]:
     """Why a column cannot be a channel, if it cannot; and what gaps it has."""
-    if column in files[0].table.faults:
-        return "not all of it are numbers, or its name is there twice", ""
+    if why := files[0].table.faults.get(column):
+        return why.removeprefix(f"{files[0].path}: "), ""
     if bad := [f for f in files if column not in f.table.values]:
         return f"missing or unusable in {_listed(bad)}", ""
     missing = {f: ~np.isfinite(f.table.values[column]) for f in files}
@@ -391,16 +396,21 @@ def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]
 
 
 def _rising_column(table: Columns) -> str:
-    """Name of the first column that rises evenly, as times do; empty if there is none.
+    """Name of the first column that rises and has a word for times in its name, such as "t_DAQ".
 
-    One that a unit says to be something else is none, nor is one that counts 1, 2, 3.
+    Without any it is the first that rises evenly, unless it counts 1, 2, 3; empty if there is none.
+    One that a unit says to be something else is none.
     """
+    even = ""
     for column, series in table.values.items():
         unit = table.units.get(column) or named_unit(column)[1]
-        is_time = unit is None or (is_unit(unit) and si_unit(unit) == "s")
-        if is_time and _step_of(series) not in (None, 1.0):
+        if unit and not (is_unit(unit) and si_unit(unit) == "s"):
+            continue
+        if "time" in _kinds(_words(column)) and series.size >= LONG and np.all(np.diff(series) > 0):
             return column
-    return ""
+        if not even and _step_of(series) not in (None, 1.0):
+            even = column
+    return even
 
 
 def _step_of(series: FloatArray) -> float | None:

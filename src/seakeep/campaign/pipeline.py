@@ -9,8 +9,8 @@ step       what it does
 `cleaned`  treats gaps and jitter as the campaign says, and flags samples
 `derived`  makes channels from others of one logger
 `resampled` puts all loggers on one axis, and makes the channels that need several of them
-`checked`  looks for faults
-`cropped`  cuts the run to the part that is used
+`cropped`  cuts the run to its span
+`checked`  looks for faults in what is left
 ========== =====================================================================================
 """
 
@@ -568,13 +568,34 @@ def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
     }
 
 
+def cropped(run: Run) -> Run:
+    """Step 7: cut the run to its span; spans that lie outside the record are refused."""
+    data, groups, reference = run.data, dict(run.groups), run.reference_time
+    place, time, record = f"runs.{run.name}.", data["time"].values, (reference[0], reference[-1])
+    # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
+    step = (record[1] - record[0]) / (reference.size - 1)
+    slack = max(usual_step(time), step) * (1 + 1e-6)
+    stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
+    spans = {key: span for key, span in stated.items() if span}
+    parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
+    if "span" in parts:
+        data = data.isel(time=parts.pop("span"))
+        time = data["time"].values
+        for name, group in run.groups.items():  # a slow logger may have no sample within
+            own = usual_step(group["time"].values)
+            groups[name] = group.sel(time=slice(time[0] - own, time[-1] + own))
+        for key in parts:
+            _part(place + key, spans[key], time, (time[0], time[-1]), np.inf)
+    return replace(run, data=data, groups=groups)
+
+
 def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str, str]) -> Run:
-    """Step 7: look for faults.
+    """Step 8: look for faults.
 
     Parameters
     ----------
     run : Run
-        The run, on one axis.
+        The run, on one axis, cut to its span.
     period : (float, float) or None
         Counted period and energy period of its waves, s, where they disagree.
     left_out : mapping of str to str
@@ -613,24 +634,6 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         left_out=left_out,
     )
     return replace(run, findings=check(record))
-
-
-def cropped(run: Run) -> Run:
-    """Step 8: cut the run to its span; spans that lie outside the record are refused."""
-    data, reference, place = run.data, run.reference_time, f"runs.{run.name}."
-    time, record = data["time"].values, (reference[0], reference[-1])
-    # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
-    step = (record[1] - record[0]) / (reference.size - 1)
-    slack = max(usual_step(time), step) * (1 + 1e-6)
-    stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
-    spans = {key: span for key, span in stated.items() if span}
-    parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
-    if "span" in parts:
-        data = data.isel(time=parts.pop("span"))
-        time = data["time"].values
-        for key in parts:
-            _part(place + key, spans[key], time, (time[0], time[-1]), np.inf)
-    return replace(run, data=data)
 
 
 def _part(

@@ -19,13 +19,13 @@ from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import cross_checks
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded, version
-from seakeep.quality import as_json, judge_probes, warn_of
+from seakeep.quality import as_json, judge_runs, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
-FORMAT = 12
+FORMAT = 13
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
@@ -151,9 +151,8 @@ class Campaign:
         return {key: expand(file, self.path.parent) for key, file in files.items()}
 
     def checksum_of(self, name: str) -> str:
-        """SHA-256 of a run's file; of the list of them where there are several."""
-        sums = [checksum(path) for path in self.files_of(name).values()]
-        return sums[0] if len(sums) == 1 else hashlib.sha256(" ".join(sums).encode()).hexdigest()
+        """SHA-256 of a run's files, one after the other."""
+        return " ".join(checksum(path) for path in self.files_of(name).values())
 
     def basis_of(self, name: str) -> str:
         """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
@@ -346,7 +345,7 @@ class Campaign:
             As :meth:`read_run`.
         """
         runs = dict(self.each_prepared(names, progress))
-        judge_probes(runs)
+        judge_runs(runs)
         return runs
 
     def each_prepared(
@@ -390,9 +389,9 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
+                run = cropped(resampled(run, dt))
+                run = checked(run, surveyed.doubts.get(name), surveyed.left_out)
                 warn_of(run.findings, reported)
-                run = cropped(run)
                 data = run.data
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():

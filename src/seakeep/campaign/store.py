@@ -10,7 +10,7 @@ from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
 from seakeep.files import check_output, load_sealed, make_folder, version, write_sealed
-from seakeep.quality import judge_probes, warn_of_runs
+from seakeep.quality import judge_runs, warn_of_runs
 
 PREPARED = "prepared run"
 """Kind of these files, which sets them apart from measurements."""
@@ -77,7 +77,7 @@ def write_prepared(
     if missing:  # a run that is new may be odd beside the others, or make one of them odd
         every = _files(campaign, out_dir, None) | files
         runs = dict(_fresh(campaign, every))
-        for name in judge_probes(runs):
+        for name in judge_runs(runs):
             write_sealed(runs[name], every[name], PREPARED)
     if failed and failures is None:
         raise as_one(failed)

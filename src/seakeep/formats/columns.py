@@ -5,7 +5,7 @@ Readers, and what may be known about a file before it is read.
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -172,17 +172,6 @@ def unique_names(headers: Iterable[str]) -> tuple[list[str], list[str | None]]:
         for (name, _), header in zip(pairs, full, strict=True)
     ]
     return names, [unit for _, unit in pairs]
-
-
-def check_lengths(
-    path: Path,
-    vectors: Mapping[str, FloatArray],
-    mend: str = "Save channels of one clock, each as long as the time.",
-) -> None:
-    """Refuse channels that differ in length."""
-    if len({vector.size for vector in vectors.values()}) > 1:
-        listed = ", ".join(f"{name} {vector.size}" for name, vector in vectors.items())
-        raise DataError(f"{path}: the channels differ in length ({listed}). {mend}")
 
 
 class Options(Table):

@@ -9,7 +9,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
-from seakeep.formats.columns import Columns, Options, check_lengths, decoding, unique_names
+from seakeep.formats.columns import Columns, Options, decoding, unique_names
 
 _NAME_KEYS = ("names", "channels", "labels", "channel_names", "name")
 _UNIT_KEYS = ("units", "unit")
@@ -17,25 +17,48 @@ _RATE_KEYS = ("fs", "Fs", "FS", "sampling_rate", "sample_rate")
 _STEP_KEYS = ("dt", "Ts", "DT")
 _VERSION_73 = b"MATLAB 7."
 """Older files start with ``MATLAB 5.0 MAT-file``, whichever release wrote them."""
+_TIMES = ("time", "Time", "t")
+_SAVE = (
+    "Save one vector per channel, one struct of vectors (run.time, run.heave, …) without structs "
+    "in it, or a matrix (time, channel) with a cell array 'names'."
+)
 
 
 def read_matlab(path: Path, options: Options) -> Columns:
     """Read a MATLAB file: vectors, one struct of vectors, or a matrix with a list of names.
 
-    Units are taken from ``units``: a struct of texts, or a list beside the names.
+    Units are taken from ``units``: a struct of texts, or a list beside the names. What is not read
+    is a fault: a vector of another length than the time, a struct, a list of units without names.
     """
     content = _unwrapped({k: v for k, v in _loaded(path).items() if not k.startswith(("__", "#"))})
     units = _units(content)
     vectors = _named_matrix(path, content) or _vectors(path, content)
-    check_lengths(path, vectors)
+    sizes = [vector.size for vector in vectors.values()]
+    clock = next((name for name in (options.time, *_TIMES) if name in vectors), None)
+    length = vectors[clock].size if clock else max(sizes, key=sizes.count)
     names, in_headers = unique_names(vectors)
     for name, unit in zip(names, in_headers, strict=True):
         if unit is not None:
             units.setdefault(name, unit)
     values = dict(zip(names, vectors.values(), strict=True))
+    faults = {
+        name: f"'{name}' has {vector.size} values, and {'the time' if clock else 'most'} {length}. "
+        "Save channels of one clock, each as long as the time, or each clock's into its own file."
+        for name, vector in values.items()
+        if vector.size != length
+    }
+    for key, value in content.items():
+        if key not in _UNIT_KEYS and isinstance(value, dict) and _length(value) > 1:
+            faults[key] = f"'{key}' is a struct beside other channels. {_SAVE}"
+        elif key in _UNIT_KEYS and not units and np.size(value) > 1:
+            faults[key] = (
+                f"'{key}' lists {np.size(value)} units, and no list says of which columns. Save a "
+                f"cell array 'names' of as many beside it, or a struct: {key}.heave = 'mm'."
+            )
     return Columns(
-        values=values,
+        values={name: vector for name, vector in values.items() if name not in faults},
         units={name: unit for name, unit in units.items() if name in values},
+        faults={name: f"{path}: {words}" for name, words in faults.items()},
         headers=dict(zip(names, vectors, strict=True)),
         sampling_rate=_rate(content),
     )
@@ -98,14 +121,21 @@ def _opaque(path: Path) -> dict[str, str]:
 
 
 def _unwrapped(content: dict[str, Any]) -> dict[str, Any]:
-    """What the only struct of a file holds, with the numbers and texts that stand beside it."""
+    """What the longest struct of a file holds, with all that is shorter beside it."""
     while True:
-        structs = [key for key, value in content.items() if isinstance(value, dict)]
-        beside = {key: value for key, value in content.items() if not isinstance(value, dict)}
-        plain = all(isinstance(value, str) or np.size(value) == 1 for value in beside.values())
-        if len(structs) != 1 or structs[0] in _UNIT_KEYS or not plain:
+        longest = max(map(_length, content.values()), default=0)
+        long = [key for key, value in content.items() if _length(value) == longest]
+        if len(long) != 1 or not isinstance(content[long[0]], dict):
             return content
-        content = {**beside, **content[structs[0]]}
+        struct = content.pop(long[0])
+        content |= struct
+
+
+def _length(value: Any) -> int:
+    """Numbers or texts in the longest array of a variable."""
+    if isinstance(value, dict):
+        return max(map(_length, value.values()), default=0)
+    return np.size(value)
 
 
 def _rate(content: Mapping[str, Any]) -> float | None:
@@ -147,7 +177,7 @@ def _named_matrix(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArra
     for key, matrix in matrices.items():
         rows, columns = matrix.shape
         if columns == len(names):
-            beside = {k: v.astype(float) for k, v in arrays.items() if v.shape == (rows,)}
+            beside = {k: v.astype(float) for k, v in arrays.items() if v.ndim == 1}
             return {**beside, **{n: matrix[:, i].astype(float) for i, n in enumerate(names)}}
         if rows == len(names):
             raise _transposed(path, key, matrix.shape)
@@ -184,7 +214,4 @@ def _vectors(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
             f"{path}: the matrix '{name}' {matrix.shape} has no names for its columns. Save a cell "
             "array 'names' beside it, or one vector per channel."
         )
-    raise DataError(
-        f"{path} holds no channels; found {', '.join(content) or 'nothing'}. Save one vector per "
-        "channel, a struct of vectors, or a matrix (time, channel) with a cell array 'names'."
-    )
+    raise DataError(f"{path} holds no channels; found {', '.join(content) or 'nothing'}. {_SAVE}")

@@ -14,7 +14,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, needing
-from seakeep.formats.columns import Columns, Options, check_lengths, decoding
+from seakeep.formats.columns import Columns, Options, decoding
 
 LEAD_IN = 28
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
@@ -52,11 +52,12 @@ def read_tdms(path: Path, options: Options) -> Columns:
         raise DataError(
             f"{path} holds no channels of numbers with at least two samples. Export the run again."
         )
-    check_lengths(
-        path,
-        {channel.name: values for channel, values in zip(channels, data, strict=True)},
-        "Put channels of one clock into one group, and state it with group = 'NAME' in [files].",
-    )
+    if len({values.size for values in data}) > 1:
+        listed = ", ".join(f"{each.name} {len(each)}" for each in channels)
+        raise DataError(
+            f"{path}: the channels differ in length ({listed}). Put channels of one clock into one "
+            "group, and state it with group = 'NAME' in [files]."
+        )
     bare = Counter(channel.name for channel in channels)
     names = [
         channel.name if bare[channel.name] == 1 else f"{channel.group_name}/{channel.name}"

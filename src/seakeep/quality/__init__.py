@@ -15,7 +15,7 @@ from seakeep.quality.findings import (
     findings_of,
     warn_of,
 )
-from seakeep.quality.probes import judge_probes
+from seakeep.quality.runs import judge_runs
 from seakeep.quality.sensors import compared
 
 __all__ = [
@@ -29,7 +29,7 @@ __all__ = [
     "check",
     "compared",
     "findings_of",
-    "judge_probes",
+    "judge_runs",
     "warn_of",
     "warn_of_runs",
 ]

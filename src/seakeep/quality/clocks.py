@@ -167,12 +167,12 @@ def steps(record: Record) -> Findings:
     edge = (0.5 * (PASSBAND + 1.0) if record.anti_alias else 1.0) * 0.5 / dt
     fate = "is damped or lost" if record.anti_alias else "is folded into slower waves"
     for logger, group, name, _ in record.recorded():
-        if not (is_elevation(name) or name in MOTIONS):
+        x = sound(group, name)
+        if x.size < 2 or not (is_elevation(name) or name in MOTIONS):
             continue
         cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
         if passed := record.whole[name].attrs.get("low_pass"):
             cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
-        x = sound(group, name)
         for kind, cut in cuts:
             share, period = energy_above(x, own[logger], cut)
             if share > LOST_ENERGY and noise_share(x) < 0.5:

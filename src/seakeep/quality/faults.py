@@ -186,10 +186,12 @@ def noise_share(series: FloatArray) -> float:
     >>> round(noise_share(np.random.default_rng(0).normal(size=4000)), 1)
     1.0
     """
+    n = series.size
+    if n < 2:
+        return 0.0
     x = series - series.mean()
-    n = x.size
     power = np.array([x[lag:] @ x[: n - lag] for lag in range(min(MEMORY, n - 1) + 1)])
-    if power[0] <= 0 or power.size < 2:
+    if power[0] <= 0:
         return 0.0
     if power[1] < -0.5 * power[0]:
         return 1.0

@@ -180,7 +180,7 @@ class Rate:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A run before it is cut to its span.
+    """A run, cut to its span.
 
     Parameters
     ----------

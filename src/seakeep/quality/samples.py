@@ -21,6 +21,8 @@ from seakeep.waves import GRAVITY
 
 FLATTEST, STEEPEST = 5e-5, 1 / 7
 """Heights of waves over their lengths in deep water, between which all that is measured lies."""
+FEWEST = 5
+"""Waves in a record whose period its spectrum shows."""
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
 
@@ -169,7 +171,7 @@ def waves(record: Record) -> Findings:
             continue
         x = sound(record.whole, name)
         period = dominant_period(x, dt) if x.size > 1 else np.nan
-        if np.isnan(period) or noise_share(x) > 0.5:
+        if not FEWEST * period <= x.size * dt or noise_share(x) > 0.5:
             continue
         height, length = 4 * float(x.std()), GRAVITY * period**2 / (2 * np.pi)
         if record.water_depth and height > record.water_depth:  # which `impossible` reports

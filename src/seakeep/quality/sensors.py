@@ -47,10 +47,6 @@ class SensorsKind(Kind):
         "wrong by {error:.2f} of its standard deviation",
         "Check [rig.positions] of the campaign, the water depth and the probes' clocks.",
     )
-    PROBE = (
-        "moves {size:.3g} times as much{turned} beside {other} as in most other runs",
-        "Check units, signs and calibrations of both in the files of {run}.",
-    )
 
 
 def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreement]:

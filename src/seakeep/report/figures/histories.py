@@ -468,7 +468,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         if (startup := float(run.attrs.get("startup", 0.0))) > time[0]:
             at.axvspan(time[0], startup, color=PALETTE["light"], zorder=0)
         at.margins(x=0.005)
-        at.tick_params(axis="x", labelbottom=True, labelsize=7)
+        at.tick_params(labelbottom=True, labelsize=7)
         at.yaxis.set_label_coords(LABELS, 0.5)  # in line: aligning them takes half of the time
     left_out = len(run.data_vars) - len(names)
     axes[-1].set_xlabel("time [s]" + f" ({left_out} more channels)" * bool(left_out))

@@ -1,8 +1,9 @@
-"""Wave probes of one rig, compared between runs: a unit, sign or gain that only one of them has."""
+"""Runs compared with one another: a probe's unit, sign or gain that only one has, a file of two."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import scipy
@@ -13,15 +14,31 @@ from seakeep.conventions import in_waves, is_elevation
 from seakeep.quality.findings import (
     Finding,
     Findings,
+    Kind,
     as_json,
     filled,
     findings_of,
     step_of,
     warn_of,
 )
-from seakeep.quality.sensors import LEAST_CORRELATION, SensorsKind
+from seakeep.quality.sensors import LEAST_CORRELATION
 from seakeep.signals import zero_up_crossings
 from seakeep.signals.waves import is_regular
+
+
+class RunsKind(Kind):
+    """Findings from the comparison of two runs."""
+
+    PROBE = (
+        "moves {size:.3g} times as much{turned} beside {other} as in most other runs",
+        "Check units, signs and calibrations of both in the files of {run}.",
+    )
+    FILE = (
+        "is one of {other} too, and both use it from {place:.4g} s to {value:.4g}",
+        "Correct it in [runs.{run}], or state spans that do not overlap: a test on samples that "
+        "trained shows memory, not skill.",
+    )
+
 
 LARGEST_CHANGE = 1.2
 """Factor between the gains of two runs below which nothing is said, on top of three standard
@@ -95,7 +112,7 @@ def odd_probes(runs: Datasets) -> Findings:
             value = float(1 / gain if is_first else gain)
             channel, other = (first, probe) if is_first else (probe, first)
             yield Finding(
-                SensorsKind.PROBE, name, channel, value, float(limit),
+                RunsKind.PROBE, name, channel, value, float(limit),
                 details={
                     "other": other,
                     "size": abs(value),
@@ -104,12 +121,25 @@ def odd_probes(runs: Datasets) -> Findings:
             )  # fmt: skip
 
 
-def judge_probes(runs: Datasets) -> list[str]:
+def shared_files(runs: Datasets) -> Findings:
+    """Runs that use the same part of files that have the same content."""
+    for (name, first), (other, second) in combinations(runs.items(), 2):
+        both = (first.attrs, second.attrs)
+        files = [set(str(each.get("file_sha256", "")).split()) for each in both]
+        uses = [(*each.get("train_span", ()), *each.get("test_span", ())) for each in both]
+        begin = max(min(use, default=np.inf) for use in uses)
+        end = min(max(use, default=-np.inf) for use in uses)
+        if begin < end and files[0] & files[1]:
+            details = {"other": name}
+            yield Finding(RunsKind.FILE, other, "file", end, None, "s", begin, details)
+
+
+def judge_runs(runs: Datasets) -> list[str]:
     """Put such findings beside the others of each run, warn of them, and say which runs changed."""
-    found, changed = list(odd_probes(runs)), []
+    found, changed = [*odd_probes(runs), *shared_files(runs)], []
     for name, run in runs.items():
         before = findings_of(run)
-        others = [each for each in before if each.kind is not SensorsKind.PROBE]
+        others = [each for each in before if not isinstance(each.kind, RunsKind)]
         every = as_json([*others, *(each for each in found if each.run == name)])
         if every != as_json(before):
             run.attrs["quality"] = every

@@ -5,8 +5,8 @@ import pytest
 from records import record
 from seas import sea
 
-from seakeep.quality import findings_of, judge_probes
-from seakeep.quality.probes import odd_probes
+from seakeep.quality import findings_of, judge_runs
+from seakeep.quality.runs import odd_probes
 
 T = np.arange(0, 160, 0.1)
 SEAS = {"low": 1.6, "middle": 1.9, "high": 2.3, "last": 2.1}
@@ -63,10 +63,10 @@ def test_still_water_says_nothing():
 def test_findings_are_warned_of_and_taken_back_once_the_file_is_repaired():
     runs = campaign(high=0.001)
     with pytest.warns(match=r"^high: eta_mid moves .* beside eta_fwd as in most other runs\."):
-        assert judge_probes(runs) == ["high"]
+        assert judge_runs(runs) == ["high"]
     assert [each.channel for each in findings_of(runs["high"])] == ["eta_mid"]
     with pytest.warns(match="high: eta_mid"):
-        assert judge_probes(runs) == []
+        assert judge_runs(runs) == []
     runs["high"]["eta_fwd"] *= 1000.0
-    assert judge_probes(runs) == ["high"]
+    assert judge_runs(runs) == ["high"]
     assert findings_of(runs["high"]) == []
