@@ -100,7 +100,7 @@ class Campaign:
             )
         return models[name]
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """SHA-256 of all settings on which the prepared runs depend, in hexadecimal digits."""
         content = self.settings.model_dump(
