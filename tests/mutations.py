@@ -191,7 +191,7 @@ CHANGES = {
     "core/solve.py": [
         ("NARROW_LIMIT if is_narrow else GRAM_LIMIT", "GRAM_LIMIT", "core/test_solve.py::test_the_newest_rows_alone_are_regressed_with_less"),
         ("min(count, rank)", "min(count, rank + 1)", "core/test_fast_paths.py::test_a_rank_is_that_of_the_truncated_matrix"),
-        ("if ridge >= least * gram_trace(self.pieces, self.delays)", "if True", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
+        ("if ridge < (NARROW_LIMIT if is_narrow else GRAM_LIMIT) * gram_trace(problem)", "if False", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
         ("ridge * problem.columns if per_snapshot else ridge", "ridge", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("solving[:, group.newest] *= 0.5", "solving[:, group.newest] *= 1.0", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
         ("weights = values / (values**2 + ridge)", "weights = values / (values**2 + ridge**2)", "core/test_solve.py::test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen"),
@@ -287,7 +287,7 @@ CHANGES = {
         ("filled(signature, values, start + 1, self.run)", "filled(signature, values, start + 1)", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
     ],
     "models/ensemble.py": [
-        ("data.regress(settings, settings.state_delays, all_rows=all_rows)", "data.regress(settings, settings.state_delays, all_rows=True)", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
+        ("data.regress(draw.settings)", "data.regress(self.settings)", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
         ("replace(draw, run=draw.run - 1)", "draw", "models/test_calibration.py::test_members_that_learn_from_the_run_alone_do_not_forecast_it"),
         ("np.maximum(load, each.floor, out=load)", "pass", "models/test_readouts.py::test_a_floor_is_never_undercut_and_a_taut_line_has_none"),
     ],

@@ -372,7 +372,7 @@ def test_stale_files_are_not_used(campaign, tank, changed, change, monkeypatch):
     elif change == "file":
         write_csv(tank / "second.csv", tank_columns(5))
     else:
-        monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
+        monkeypatch.setattr("seakeep.campaign.prepare.version", lambda: "99.0")
     assert load_prepared(campaign)["second"]["heave"].std() > 0.0
 
 

@@ -47,7 +47,7 @@ def problems(draw):
 @given(problems())
 def test_the_trace_is_the_sum_of_squares(problem):
     regressors, _ = problem.matrices()
-    found = gram_trace(problem.pieces, problem.delays)
+    found = gram_trace(problem.delayed)
     assert found == pytest.approx(np.sum(regressors**2), rel=TIGHT)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seakeep.core import embed, identify
-from seakeep.core.gram import Piece
+from seakeep.core.gram import Delayed
 
 
 @dataclass(frozen=True)
@@ -33,17 +33,10 @@ class Problem:
         return zip(self.states, self.inputs, self.direct, self.windows, strict=True)
 
     @property
-    def pieces(self):
-        """What the fast paths take, without groups that have no channel."""
-        return [
-            Piece(x, tuple(g for g in (x, u, d) if g.shape[1]), window.first_column, window.columns)
-            for x, u, d, window in self.runs()
-        ]
-
-    @property
-    def delays(self):
-        groups = zip((self.states, self.inputs, self.direct), (self.s, self.z, 0), strict=True)
-        return tuple(delay for group, delay in groups if group[0].shape[1])
+    def delayed(self):
+        """What the fast paths take."""
+        groups = (self.states, self.s), (self.inputs, self.z), (self.direct, 0)
+        return Delayed.of(self.states, groups, self.windows)
 
     def solved(self, ridge, **options):
         settings = {"state_delays": self.s, "input_delays": self.z, "direct": self.direct}

@@ -100,7 +100,7 @@ class Campaign:
             )
         return models[name]
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """SHA-256 of all settings on which the prepared runs depend, in hexadecimal digits."""
         content = self.settings.model_dump(
@@ -154,8 +154,11 @@ class Campaign:
         """SHA-256 of a run's files, one after the other."""
         return " ".join(checksum(path) for path in self.files_of(name).values())
 
-    def basis_of(self, name: str) -> str:
-        """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
+    def basis_of(self, name: str) -> dict[str, str]:
+        """Attributes by which a prepared run is fresh: the campaign, its digest, our version.
+
+        And the SHA-256 of all files on which the run depends, through period and clocks too.
+        """
         pooled = self.settings.instruments.pool_drift and self._run(name).files
         sums = []
         for each in dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])]):
@@ -163,7 +166,12 @@ class Campaign:
                 sums.append(self.checksum_of(each))
             except (MissingFileError, OSError):
                 sums.append("unreadable")
-        return hashlib.sha256(" ".join(sums).encode()).hexdigest()
+        return {
+            "campaign": self.name,
+            "campaign_digest": self.digest,
+            "basis_sha256": hashlib.sha256(" ".join(sums).encode()).hexdigest(),
+            "seakeep_version": version(),
+        }
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
@@ -461,12 +469,9 @@ class Campaign:
         rig, general = campaign.rig, campaign.campaign
         time = run.data["time"].values
         attributes: dict[str, Any] = {
-            "campaign": self.name,
-            "campaign_digest": self.digest,
+            **self.basis_of(name),
             "file_sha256": self.checksum_of(name),
-            "basis_sha256": self.basis_of(name),
             "run": name,
-            "seakeep_version": version(),
             "file": settings.file or ", ".join(settings.files.values()),
             "preparation_preset": campaign.preparation.preset,
             "dt": dt,

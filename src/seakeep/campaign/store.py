@@ -9,7 +9,7 @@ from seakeep.arrays import Groups, Progress
 from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
-from seakeep.files import check_output, load_sealed, make_folder, version, write_sealed
+from seakeep.files import check_output, load_sealed, make_folder, write_sealed
 from seakeep.quality import judge_runs, warn_of_runs
 
 PREPARED = "prepared run"
@@ -151,11 +151,5 @@ def _fresh(campaign: Campaign, files: Mapping[str, Path]) -> Iterator[tuple[str,
         except SeakeepError as error:
             warn(f"{error} The run is prepared anew.")
             continue
-        expected = {
-            "campaign_digest": campaign.digest,
-            "basis_sha256": campaign.basis_of(name),
-            "seakeep_version": version(),
-            "campaign": campaign.name,
-        }
-        if all(run.attrs.get(key) == value for key, value in expected.items()):
+        if all(run.attrs.get(key) == value for key, value in campaign.basis_of(name).items()):
             yield name, run

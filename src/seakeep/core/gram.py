@@ -36,12 +36,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import lapack
 
 from seakeep.arrays import FloatArray
+from seakeep.core.embedding import TrainingWindow
 
 BLOCK_WIDTH = 96
 """Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
@@ -105,9 +107,43 @@ def lay_out(channels: Iterable[int], lags: Iterable[int]) -> tuple[Group, ...]:
     return tuple(groups)
 
 
-def groups_of(piece: Piece, delays: Sequence[int]) -> tuple[Group, ...]:
-    """Places of the regressors of a run, with these delays."""
-    return lay_out((x.shape[1] for x in piece.series), (delay + 1 for delay in delays))
+@dataclass(frozen=True, eq=False)
+class Delayed:
+    """A regression of delayed series: snapshot pairs of several runs, and delays of each group."""
+
+    pieces: Sequence[Piece]
+    delays: Sequence[int]
+
+    @classmethod
+    def of(
+        cls,
+        states: Sequence[FloatArray],
+        groups: Sequence[tuple[Sequence[FloatArray], int]],
+        windows: Sequence[TrainingWindow],
+    ) -> Self:
+        """Regression of runs on groups by run, each with its delays; one may have no channel."""
+        there = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
+        pieces = [
+            Piece(x, tuple(runs[run] for runs, _ in there), window.first_column, window.columns)
+            for run, (x, window) in enumerate(zip(states, windows, strict=True))
+        ]
+        return cls(pieces, [delays for _, delays in there])
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Places of the groups; the first ends with the extended state."""
+        channels = (x.shape[1] for x in self.pieces[0].series)
+        return lay_out(channels, (delay + 1 for delay in self.delays))
+
+    @property
+    def rows(self) -> int:
+        """Regressors."""
+        return self.groups[-1].stop
+
+    @property
+    def columns(self) -> int:
+        """Snapshot pairs."""
+        return sum(piece.count for piece in self.pieces)
 
 
 def _sum_down(gram: FloatArray, heads: FloatArray, groups: Sequence[Group]) -> None:
@@ -151,11 +187,11 @@ class PrimalSystem:
     groups: tuple[Group, ...]
 
 
-def gram_trace(pieces: Sequence[Piece], delays: Sequence[int]) -> float:
+def gram_trace(problem: Delayed) -> float:
     """Trace of the Gram matrix, which bounds the largest squared singular value from above."""
     total = 0.0
-    for piece in pieces:
-        for series, delay in zip(piece.series, delays, strict=True):
+    for piece in problem.pieces:
+        for series, delay in zip(piece.series, problem.delays, strict=True):
             # Only what the snapshots reach: what stands before may be a gap.
             reached = series[piece.first - delay : piece.first + piece.count]
             # Each sample counts as often as there are lags at which a snapshot holds it.
@@ -165,13 +201,10 @@ def gram_trace(pieces: Sequence[Piece], delays: Sequence[int]) -> float:
     return total
 
 
-def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSystem:
-    r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
-
-    `delays` holds those of each group.
-    """
-    groups = groups_of(pieces[0], delays)
-    size, width = groups[-1].stop, groups[-1].head.stop
+def primal_system(problem: Delayed) -> PrimalSystem:
+    r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`."""
+    pieces, groups = problem.pieces, problem.groups
+    size, width = problem.rows, groups[-1].head.stop
     edges, heads = np.zeros((2 * len(pieces), size)), np.zeros((width, size))
     N = pieces[0].states.shape[1]
     right = np.zeros((N, size))
@@ -202,16 +235,16 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSyste
     return PrimalSystem(gram, right, heads, edges, groups)
 
 
-def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
+def snapshot_gram(problem: Delayed) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs."""
-    groups = groups_of(pieces[0], delays)
+    pieces, groups = problem.pieces, problem.groups
     width = groups[-1].head.stop
     counts = [piece.count for piece in pieces]
     ends = np.cumsum([0, *counts])
     steps = np.zeros((ends[-1], 2 * width))
     for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
         rows, first, count = steps[begin:stop], piece.first, piece.count
-        for x, delay, group in zip(piece.series, delays, groups, strict=True):
+        for x, delay, group in zip(piece.series, problem.delays, groups, strict=True):
             rows[1:, group.head] = x[first + 1 : first + count]
             rows[1:, width:][:, group.head] = x[first - delay : first - delay + count - 1]
     signed = np.ascontiguousarray(steps.T)

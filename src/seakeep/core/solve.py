@@ -33,7 +33,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -43,12 +42,10 @@ from scipy.linalg import blas
 from seakeep.arrays import FloatArray
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
-    Group,
-    Piece,
+    Delayed,
     PrimalSystem,
     factorise,
     gram_trace,
-    groups_of,
     lagged_sums,
     primal_system,
     snapshot_gram,
@@ -150,25 +147,15 @@ def identify(
     groups.append((inputs, input_delays))
     if direct is not None:
         groups.append((direct, 0))
-    groups = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
-    pieces = [
-        Piece(
-            states[run],
-            tuple(runs[run] for runs, _ in groups),
-            window.first_column,
-            window.columns,
-        )
-        for run, window in enumerate(windows)
-    ]
-    problem = _Delayed(pieces, tuple(delays for _, delays in groups), all_rows)
+    problem = Delayed.of(states, groups, windows)
     effective = ridge * problem.columns if per_snapshot else ridge
-    chosen = "svd" if rank is not None else method or problem.choose(effective)
+    chosen = "svd" if rank is not None else method or _choose(problem, effective, all_rows)
     if chosen == "svd":
-        solution = _by_singular_values(*problem.matrices(), effective, rank)
+        solution = _by_singular_values(*_matrices(problem, all_rows), effective, rank)
     else:
-        form = problem.primal if chosen == "primal" else problem.dual
+        form = _primal if chosen == "primal" else _dual
         count = min(problem.rows, problem.columns)
-        solution = Solution(form(effective), chosen, effective, count)
+        solution = Solution(form(problem, effective, all_rows), chosen, effective, count)
     if radius is None or state_delays is None:
         return solution
     size = problem.groups[0].stop
@@ -177,91 +164,67 @@ def identify(
     return replace(solution, coefficients=coefficients, clipped=clipped)
 
 
-@dataclass(frozen=True)
-class _Delayed:
-    """A regression of delayed series: snapshot pairs of several runs, and delays of each group."""
+def _choose(problem: Delayed, ridge: float, all_rows: bool) -> Method:
+    """The form that is less work, or singular values where λ is too small for a Gram matrix."""
+    p, n, a = problem.rows, problem.columns, problem.groups[0].stop
+    is_narrow = not all_rows and p <= n
+    if ridge < (NARROW_LIMIT if is_narrow else GRAM_LIMIT) * gram_trace(problem):
+        return "svd"
+    if not all_rows:
+        return "primal" if p <= n else "dual"
+    # By their largest terms.
+    b = p - a
+    rank = 2 * (problem.groups[-1].head.stop + len(problem.pieces))
+    primal = p**3 / 3 + 2 * rank * p * (p + a)
+    dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
+    return "primal" if primal <= dual else "dual"
 
-    pieces: Sequence[Piece]
-    delays: tuple[int, ...]
-    all_rows: bool
 
-    @cached_property
-    def groups(self) -> tuple[Group, ...]:
-        """Places of the groups; the first ends with the extended state."""
-        return groups_of(self.pieces[0], self.delays)
+def _matrices(problem: Delayed, all_rows: bool) -> tuple[FloatArray, FloatArray]:
+    """Hankel matrices of regressors and targets, built."""
+    target_delays = problem.delays[0] if all_rows else 0
+    regressors, targets = [], []
+    for piece in problem.pieces:
+        groups = zip(piece.series, problem.delays, strict=True)
+        extended = [embed(x, delay, piece.first, piece.count) for x, delay in groups]
+        regressors.append(np.concatenate(extended))
+        targets.append(embed(piece.states, target_delays, piece.first + 1, piece.count))
+    return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
-    @property
-    def rows(self) -> int:
-        """Regressors."""
-        return self.groups[-1].stop
 
-    @property
-    def columns(self) -> int:
-        """Snapshot pairs."""
-        return sum(piece.count for piece in self.pieces)
+def _primal(problem: Delayed, ridge: float, all_rows: bool) -> FloatArray:
+    r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
+    system = primal_system(problem)
+    factor = factorise(system.gram, ridge)
+    return _all_rows(system, factor, ridge) if all_rows else solve_rows(factor, system.right)
 
-    def form(self) -> Method:
-        """The form that is less work, by its largest terms."""
-        p, n, a = self.rows, self.columns, self.groups[0].stop
-        if not self.all_rows:
-            return "primal" if p <= n else "dual"
-        b = p - a
-        rank = 2 * (self.groups[-1].head.stop + len(self.pieces))
-        primal = p**3 / 3 + 2 * rank * p * (p + a)
-        dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
-        return "primal" if primal <= dual else "dual"
 
-    def choose(self, ridge: float) -> Method:
-        """The form, or singular values where λ is too small for a Gram matrix."""
-        is_narrow = not self.all_rows and self.rows <= self.columns
-        least = NARROW_LIMIT if is_narrow else GRAM_LIMIT
-        return self.form() if ridge >= least * gram_trace(self.pieces, self.delays) else "svd"
+def _dual(problem: Delayed, ridge: float, all_rows: bool) -> FloatArray:
+    r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
 
-    def matrices(self) -> tuple[FloatArray, FloatArray]:
-        """Hankel matrices of regressors and targets, built."""
-        target_delays = self.delays[0] if self.all_rows else 0
-        regressors, targets = [], []
-        for piece in self.pieces:
-            groups = zip(piece.series, self.delays, strict=True)
-            extended = [embed(x, delay, piece.first, piece.count) for x, delay in groups]
-            regressors.append(np.concatenate(extended))
-            targets.append(embed(piece.states, target_delays, piece.first + 1, piece.count))
-        return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
-
-    def primal(self, ridge: float) -> FloatArray:
-        r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
-        system = primal_system(self.pieces, self.delays)
-        factor = factorise(system.gram, ridge)
-        if self.all_rows:
-            return _all_rows(system, factor, ridge)
-        return solve_rows(factor, system.right)
-
-    def dual(self, ridge: float) -> FloatArray:
-        r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
-
-        With :math:`K + \lambda I = L L^T` the newest rows are :math:`(K + \lambda I)^{-1} X'^T`
-        summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
-        :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
-        """
-        targets = np.concatenate([piece.targets for piece in self.pieces])
-        N = targets.shape[1]
-        factor = factorise(snapshot_gram(self.pieces, self.delays), ridge)
-        if not self.all_rows:
-            weights = solve_rows(factor, targets.T.copy()).T
-            top, at = np.zeros((N, self.rows)), 0
-            for piece in self.pieces:
-                own = weights[at : at + piece.count]
-                at += piece.count
-                for series, group in zip(piece.series, self.groups, strict=True):
-                    top[:, group.rows] += lagged_sums(own, series, piece.first, group.lags)
-            return top
-        stacked = np.concatenate([self.matrices()[0], targets.T])
-        half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
-        regressors, newest = half[:, : self.rows], half[:, self.rows :]
-        out = np.empty((self.groups[0].stop, self.rows))
-        np.matmul(newest.T, regressors, out=out[:N])
-        np.matmul(regressors[:, : len(out) - N].T, regressors, out=out[N:])
-        return out
+    With :math:`K + \lambda I = L L^T` the newest rows are :math:`(K + \lambda I)^{-1} X'^T`
+    summed against the lagged series; all rows are :math:`\hat X' L^{-T} Z` with
+    :math:`Z = L^{-1} \hat Y^T`, and those of the delayed states are :math:`P Z^T Z`.
+    """
+    targets = np.concatenate([piece.targets for piece in problem.pieces])
+    N = targets.shape[1]
+    factor = factorise(snapshot_gram(problem), ridge)
+    if not all_rows:
+        weights = solve_rows(factor, targets.T.copy()).T
+        top, at = np.zeros((N, problem.rows)), 0
+        for piece in problem.pieces:
+            own = weights[at : at + piece.count]
+            at += piece.count
+            for series, group in zip(piece.series, problem.groups, strict=True):
+                top[:, group.rows] += lagged_sums(own, series, piece.first, group.lags)
+        return top
+    stacked = np.concatenate([_matrices(problem, all_rows)[0], targets.T])
+    half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
+    regressors, newest = half[:, : problem.rows], half[:, problem.rows :]
+    out = np.empty((problem.groups[0].stop, problem.rows))
+    np.matmul(newest.T, regressors, out=out[:N])
+    np.matmul(regressors[:, : len(out) - N].T, regressors, out=out[N:])
+    return out
 
 
 def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:

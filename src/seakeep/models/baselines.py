@@ -228,7 +228,7 @@ class ARX(LinearSpec):
 
     def solve(self, data: TrainingData) -> Solution:
         """Rows of the next states."""
-        return data.regress(self, self.state_delays)
+        return data.regress(self)
 
 
 @dataclass(frozen=True)
@@ -278,7 +278,7 @@ class FIR(LinearSpec):
 
     def solve(self, data: TrainingData) -> Solution:
         """Filters of the inputs, beside zeros for the states."""
-        system = data.regress(self, None)
+        system = data.regress(self)
         size = len(system.coefficients)
         return replace(
             system, coefficients=np.hstack([np.zeros((size, size)), system.coefficients])

@@ -607,7 +607,7 @@ def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
         if not driving.shape[2]:
             driving = np.zeros((len(driving), steps, 0))
         history = own.state_scale.deviations(windows.histories[:, -1 - own.state_delays :])
-        direct = own.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
+        direct = own.direct_scale.deviations(windows.direct)
         batches.append((history, own.input_scale.deviations(driving), direct))
     computed = rollouts(*member.matrices, batches, n_states=len(own.state_labels))
     with np.errstate(over="ignore"):  # a run that is lost is cut just below

@@ -211,7 +211,7 @@ class HankelEnsemble(Model):
         """What a free run of a member needs, or of what they are centred on: number n_members."""
         if self.identified:
             return self.identified[number]
-        _, data, solution = self._identified(number)
+        data, solution = self._identified(number)
         return Dynamics(solution.coefficients, data.signature)
 
     def member(self, number: int) -> HankelDMDcModel:
@@ -238,22 +238,20 @@ class HankelEnsemble(Model):
                 f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
                 f"0 to {self.n_members - 1}."
             )
-        settings, data, solution = self._identified(number)
+        data, solution = self._identified(number)
         return HankelDMDcModel(
-            settings=settings,
+            settings=self.members[number].settings,
             coefficients=solution.coefficients,
             signature=replace(data.signature, readouts=self.signature.readouts),
             training=data.training(solution),
             coverage=self.coverage,
         )
 
-    def _identified(self, number: int) -> tuple[HankelSettings, TrainingData, Solution]:
-        """Settings, training data and regression of a member."""
+    def _identified(self, number: int) -> tuple[TrainingData, Solution]:
+        """Training data and regression of a member."""
         draw = self._taught[number]
-        settings = draw.settings
-        data = self.arrays.data(settings, draw.run, draw.last, self.signature)
-        all_rows = settings.delay_rows == "ridge"
-        return settings, data, data.regress(settings, settings.state_delays, all_rows=all_rows)
+        data = self.arrays.data(draw.settings, draw.run, draw.last, self.signature)
+        return data, data.regress(draw.settings)
 
     def spectral_radii(
         self, *, executor: Executor | None = None, progress: Progress | None = None

@@ -29,7 +29,7 @@ from seakeep.models import engine, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.engine import Series, Windows, first_lost
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
+from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix
 from seakeep.models.settings import Needs, Role
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
@@ -136,7 +136,6 @@ class Model:
             raise RequestError(
                 f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
             )
-        name = run_name(run, name)
         places = [(name, start) for start in starts]
         return engine.read_groups(self.signature, {name: run}, [(places, steps)], ahead)[0]
 

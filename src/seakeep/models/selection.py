@@ -245,8 +245,7 @@ class Problem:
         """Which delayed and direct regressors a candidate has."""
         chain = self.data.signature.input_map
         delayed, direct = [True] * len(self.data.signature.inputs), list[bool]()
-        bound = () if chain.observed is None else chain.observed.bound
-        for observable, each in zip(self.widest.observables, bound, strict=True):
+        for observable, each in zip(self.widest.observables, chain.columns.bound, strict=True):
             columns = [observable in candidate.observables] * len(each.labels)
             (delayed if each.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared

@@ -484,7 +484,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             solution, data, variation = regress_varying(data, self, self.parameter, values)
             model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
             return replace(model, variation=variation)
-        solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
+        solution = data.regress(self)
         return HankelDMDcModel.fitted(self, data, solution, runs, readouts)
 
 

@@ -110,9 +110,7 @@ class TrainingData:
         x, u, w = (scale.physical(values[run]) for scale, values in groups)
         return x, u, w
 
-    def regress(
-        self, settings: HankelSettings, state_delays: int | None, *, all_rows: bool = False
-    ) -> Solution:
+    def regress(self, settings: HankelSettings) -> Solution:
         """Rows of the next states, or of all delayed ones, from these data.
 
         Means over blocks of delayed states enter as regressors without delays; the rows that are
@@ -123,13 +121,13 @@ class TrainingData:
             self.states,
             self.delayed,
             self.windows,
-            state_delays=state_delays,
+            state_delays=None if settings.is_filter else settings.state_delays,
             input_delays=settings.input_delays,
             direct=with_means(settings, self.states, self.direct),
             ridge=float(settings.ridge),
             per_snapshot=settings.ridge_scale == "per_snapshot",
             rank=settings.rank,
-            all_rows=all_rows,
+            all_rows=settings.delay_rows == "ridge",
             radius=settings.radius,
         )
         count = len(self.signature.states)
@@ -171,14 +169,10 @@ def system_of(
 ) -> gram.PrimalSystem:
     """Gram matrix of runs, given as states, delayed and direct regressors, each by run."""
     states, delayed, direct = groups
-    series = states, delayed, with_means(settings, states, direct)
-    delays = settings.state_delays, settings.input_delays, 0
-    there = [n for n, group in enumerate(series) if group[0].shape[1]][settings.is_filter :]
-    pieces = [
-        gram.Piece(x, tuple(series[n][run] for n in there), window.first_column, window.columns)
-        for run, (x, window) in enumerate(zip(states, windows, strict=True))
-    ]
-    return gram.primal_system(pieces, [delays[n] for n in there])
+    series = [(delayed, settings.input_delays), (with_means(settings, states, direct), 0)]
+    if not settings.is_filter:
+        series.insert(0, (states, settings.state_delays))
+    return gram.primal_system(gram.Delayed.of(states, series, windows))
 
 
 def gather(

@@ -181,18 +181,12 @@ def dominant_period(series: ArrayLike, dt: float) -> float:
     >>> round(dominant_period(np.sin(np.arange(0, 100, 0.05) * 2 * np.pi / 1.6), 0.05), 1)
     1.6
     """
-    return _spectrum(series, dt)[2]
-
-
-def _spectrum(series: ArrayLike, dt: float) -> tuple[FloatArray, FloatArray, float]:
-    """Power of a series, its frequencies, and the period at the peak, as `dominant_period`."""
     x = as_series(series)
     if x.size < 8 or not np.ptp(x):
-        return x, x, np.nan
-    power, lines = tapered_power(x), fft.rfftfreq(x.size, dt)
-    smooth = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
+        return np.nan
+    smooth = np.convolve(tapered_power(x), [0.25, 0.5, 0.25], mode="same")
     smooth[:3] = 0.0
-    return power, lines, float(1.0 / lines[np.argmax(smooth)])
+    return float(1.0 / fft.rfftfreq(x.size, dt)[np.argmax(smooth)])
 
 
 def tapered_power(x: FloatArray) -> FloatArray:
@@ -562,9 +556,11 @@ def energy_above(series: ArrayLike, dt: float, edge: float) -> tuple[float, floa
     >>> round(share, 2), round(period, 2)
     (0.2, 1.0)
     """
-    power, lines, period = _spectrum(series, time_step(dt))
+    x, step = as_series(series), time_step(dt)
+    period = dominant_period(x, step)
     if not np.isfinite(period):
         return np.nan, np.nan
+    power, lines = tapered_power(x), fft.rfftfreq(x.size, step)
     waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
     return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
 

@@ -372,7 +372,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
     radius, seconds, models = [], [], {}
     for name, each in variants.items():
         begin = process_time()
-        solution = data.regress(each, each.state_delays, all_rows=True)
+        solution = data.regress(each)
         seconds.append(process_time() - begin)
         models[name] = HankelDMDcModel.fitted(each, data, solution, parts)
         radius.append(spectral_radius(models[name].dynamics))
