@@ -17,6 +17,7 @@ from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, Sea
 from seakeep.models import KINDS, alignment, load_model, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
+from seakeep.models.inputs import InputMap
 
 DT, HEAVE = 0.1, (["heave"], ["eta"])
 
@@ -183,10 +184,10 @@ def test_a_history_inside_the_window_is_not_counted_twice():
         for history in ("inside", "before")
     }
     plain, longer = (
-        SimpleNamespace(history=lambda z, most=most: most, lead_samples=0) for most in (12, 60)
+        SimpleNamespace(history=lambda z, most=most: most, after=0) for most in (12, 60)
     )
     assert [draws[key].needed(plain) for key in draws] == [50, 62]
     assert draws["inside"].needed(longer) == 62  # a pair after the longest history
-    early = SimpleNamespace(history=lambda z: z, lead_samples=7)
+    early = InputMap(lead=7)
     every = Draw(HankelDMDc(4, 12, 1.0), (1.0, 0.2, 0.5))
     assert every.needed(early) == 12 + 2 + 6  # and the inputs that lead by six samples more

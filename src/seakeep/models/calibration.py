@@ -161,7 +161,7 @@ def calibrate(
     judged = held_out(sources, named, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
-        ahead = max(ensemble.signature.lead_samples - 1, 0)
+        ahead = ensemble.signature.input_after
         longest = max(run.sizes["time"] for run in named.values()) - history - ahead
         reason = "members have read what is left of them"
         if longest < steps:
@@ -308,7 +308,7 @@ def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) ->
     begin, end = (np.inf, -np.inf) if known is None else ensemble.read_spans[known]
     places, at = [], signature.history_samples - 1
     # The last step reads the input beyond its own end where the model looks further ahead.
-    while at + steps + max(signature.lead_samples - 1, 0) < time.size:
+    while at + steps + signature.input_after < time.size:
         # The instants at + 1 … at + steps are forecast.
         if time[at + 1] <= end + slack and time[at + steps] >= begin - slack:
             at = int(np.searchsorted(time, end - slack))

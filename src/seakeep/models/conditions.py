@@ -353,7 +353,7 @@ def _part(model: HankelDMDcModel, run: xr.Dataset, span: tuple[float, float]) ->
     labelled.check_run(run, name)
     slack = 1e-3 * model.dt
     part = run.sel(time=slice(span[0] - slack, span[1] + slack))
-    needed = model.history_samples + BLOCKS + max(model.lead_samples - 1, 0)
+    needed = model.history_samples + BLOCKS + model.signature.input_after
     if part.sizes["time"] < needed:
         raise RequestError(
             f"the span [{span[0]:g}, {span[1]:g}] s holds {part.sizes['time']} samples of {name}; "
@@ -380,7 +380,7 @@ def _offset_errors(model: HankelDMDcModel, part: xr.Dataset, distance: float) ->
     run, name = part.assign_attrs(probe_offset=float(distance)), labelled.run_name(part, "the run")
     at = model.history_samples - 1
     # The last step reads the input `lead_samples` after the instant that it starts from.
-    steps = part.sizes["time"] - model.history_samples - max(model.lead_samples - 1, 0)
+    steps = part.sizes["time"] - model.history_samples - model.signature.input_after
     (predicted,), (measured,) = model.judged_runs(run, name, [at], steps)
     out: FloatArray = np.mean((predicted - measured) ** 2 / measured.var(axis=0), axis=1)
     if not np.all(np.isfinite(out)):

@@ -73,8 +73,8 @@ class Draw:
     def needed(self, input_map: InputMap) -> int:
         """Samples of a run that the window, its history and its look-ahead take."""
         settings = self.settings
-        reach = max(settings.state_reach, input_map.history(settings.input_delays))
-        least = reach + 2 + max(input_map.lead_samples - 1, 0)
+        reach = settings.reach(input_map)
+        least = reach + 2 + input_map.after
         if settings.window is None:
             return least
         inside = settings.history == "inside"

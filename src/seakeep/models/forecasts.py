@@ -141,7 +141,7 @@ class Model:
 
     def judged_starts(self, run: xr.Dataset, steps: int, first: int = 0) -> range:
         """Samples from which windows end to end can be forecast in a run, from `first` on."""
-        last = run.sizes["time"] - steps - max(self.lead_samples - 1, 0)
+        last = run.sizes["time"] - steps - self.signature.input_after
         return range(max(first, self.history_samples - 1), last, steps)
 
     def judged_runs(

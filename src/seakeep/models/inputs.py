@@ -93,6 +93,11 @@ class InputMap:
         return self._around[2]
 
     @property
+    def after(self) -> int:
+        """Samples of input that a step reads after the instant that it forecasts."""
+        return max(self.lead_samples - 1, 0)
+
+    @property
     def is_identity(self) -> bool:
         """Whether inputs drive the model as they are."""
         return self.alignment is None and self.observed is None and not self.lead
@@ -401,6 +406,11 @@ class Signature:
     def input_history(self) -> int:
         """Samples of input before the start that a forecast reads."""
         return self.input_map.history(self.input_delays)
+
+    @property
+    def input_after(self) -> int:
+        """Samples of input after its last instant that a forecast reads."""
+        return self.input_map.after
 
     @property
     def history_samples(self) -> int:

@@ -431,8 +431,8 @@ def _problem(
     widest = replace(widest, ridge=1.0, standardize=True)
     runs, states, inputs = given
     chain = widest.input_map(runs, states, inputs, widest.window)
-    before = max(widest.state_reach, chain.history(widest.input_delays))
-    after = max(chain.lead_samples - 1, 0)
+    before = widest.reach(chain)
+    after = chain.after
     pieces = dict(runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
         pieces = {}

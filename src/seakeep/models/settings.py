@@ -393,6 +393,10 @@ class HankelSettings:
         """Longest delay of the states: s, or the memory."""
         return max(self.state_delays, self.memory)
 
+    def reach(self, input_map: InputMap) -> int:
+        """Longest history that a step reads, of the states or of the inputs."""
+        return max(self.state_reach, input_map.history(self.input_delays))
+
     def having(self, **changes: Any) -> Self:
         """These settings with others, as far as their kind has them."""
         own = {each.name for each in fields(self) if each.init}

@@ -218,7 +218,7 @@ def gather(
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
     input_map = input_map or settings.input_map(runs, states, inputs, window)
-    reach = max(state_delays, input_map.history(input_delays))
+    reach = settings.reach(input_map)
     pieces, read = [], []
     for name, run in runs.items():
         time = np.asarray(run.variables["time"].values, dtype=float)
@@ -257,11 +257,10 @@ def _place(
 
     A step from j reads the input up to j + lead, and none after the window.
     """
-    delays = settings.state_reach
-    reach = max(delays, input_map.history(settings.input_delays))
-    place = training_window(last, settings.window, delays, reach, settings.history)
+    reach = settings.reach(input_map)
+    place = training_window(last, settings.window, settings.state_reach, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
-    final = last - max(input_map.lead_samples - 1, 0)
+    final = last - input_map.after
     shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
     return place, shifted, slice(begin, final + 1)
 

@@ -297,7 +297,7 @@ def compute(
     fitted = spec.fit(*plan.taught(training.spans), **how)
     if spec.is_ensemble and fitted.settings.delay_rows == "exact":  # members take little room
         fitted = fitted.hold()
-    ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
+    ahead = fitted.signature.input_after * plan.dt
     words = {"units": "s", "long_name": "waves read after the instant that is forecast"}
     chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, words)}
     out = {"chosen": xr.Dataset(chosen)}
