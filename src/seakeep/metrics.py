@@ -11,11 +11,12 @@ runs that of the noise in ``noise_std``.
 
 With ``interval=0.95`` a measure gives the bounds of its interval instead of its value, along a
 first axis (lower, upper; of Datasets the dimension ``bound``). Predicted and measured samples are
-redrawn together in blocks as long as the errors depend on one another (Politis and White), with the
-same draws for the same call; Student's distribution accounts for few blocks. The interval states
-the uncertainty of the value for a longer record of this run and this model. For the uncertainty
-over runs and training sets see :func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are
-redrawn from the measured ones, so that their bounds are rough.
+redrawn together in blocks as long as what errors and measurement add to the NRMSE depends on
+itself (Politis and White), with the same draws for the same call; Student's distribution accounts
+for few blocks. The interval states the uncertainty of the value for a longer record of this run
+and this model. For the uncertainty over runs and training sets see
+:func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are redrawn from the measured ones,
+so that their bounds are rough.
 """
 
 import functools
@@ -162,13 +163,17 @@ def _valued(
 
 
 def _block(p: FloatArray, m: FloatArray) -> int:
-    """Instants over which the squared errors of a forecast depend on each other."""
-    spread = m.std(axis=-2, keepdims=True)
-    square = np.nansum(((p - m) / np.where(spread > 0, spread, np.nan)) ** 2, axis=-1)
-    square = np.where(np.isfinite(square), square, 0.0).reshape(-1, p.shape[-2]).mean(axis=0)
+    """Instants over which those parts of an NRMSE depend on each other that are redrawn."""
+    error, apart = (p - m) ** 2, (m - m.mean(axis=-2, keepdims=True)) ** 2
+    with undefined():
+        square, variance = (each.mean(axis=-2, keepdims=True) for each in (error, apart))
+        # Twice what an instant adds to the ratio of error and spread.
+        parts = np.sqrt(square / variance) * (error / square - apart / variance)
+    parts = np.where(np.isfinite(parts), parts, 0.0).sum(axis=-1)
+    series = parts.reshape(-1, p.shape[-2]).mean(axis=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SeakeepWarning)  # few blocks widen the interval
-        return 1 if np.ptp(square) == 0 else block_length(square, "politis_white")
+        return 1 if np.ptp(series) == 0 else block_length(series, "politis_white")
 
 
 def _redrawn(
@@ -181,6 +186,9 @@ def _redrawn(
 ) -> FloatArray:
     """A measure over redrawn blocks of instants; draws lie on the axis of time."""
     rows = bootstrap_indices(m.shape[-2], REDRAWN, block, np.random.default_rng(seed))
+    # Standard deviations of each window are those of all of its draws.
+    known = {key: np.asarray(each)[..., None, :] if np.ndim(each) > 1 else each
+             for key, each in known.items()}  # fmt: skip
     step = max(1, AT_ONCE // max(p.size, m.size))
     pieces = [rows[first : first + step] for first in range(0, REDRAWN, step)]
     return np.concatenate(

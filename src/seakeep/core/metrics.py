@@ -133,7 +133,7 @@ def slack_share(load: FloatArray, noise_std: float) -> float:
     load : ndarray, shape (time,)
         Load of a line, which only pulls.
     noise_std : float
-        Standard deviation of its noise, as :func:`seakeep.signals.noise_floor` estimates it.
+        Standard deviation of its noise, as :func:`seakeep.signals.waves.noise_floor` estimates it.
 
     Returns
     -------
@@ -156,8 +156,8 @@ def nrmse(pair: Pair) -> FloatArray:
         whose measured SD is below 1 % of it (a slack line) is NaN.
     noise_std : array_like, shape (…, channel), optional
         Standard deviations of the noise, by default the ones that prepared runs carry
-        (:func:`seakeep.signals.noise_floor`); a channel more than half of whose measured variance
-        is noise is NaN.
+        (:func:`seakeep.signals.waves.noise_floor`); a channel more than half of whose measured
+        variance is noise is NaN.
 
     Returns
     -------
