@@ -279,7 +279,7 @@ def test_full_scale_by_froudes_law(run, place):
     edit(scaled, ("[campaign]", "[campaign]\nscale_factor = 25.0"))
     run(command.format(scaled, "model_scale"))
     _, err = run(command.format(scaled, "full_scale") + " --full-scale")
-    assert "Times are at full scale (1:25); --start and --steps at model scale." in err
+    assert "at full scale (1:25); notes, --start and --steps are at model scale." in err
     small, full = (xr.load_dataset(place / f"{n}_scale.nc") for n in ("model", "full"))
     # Froude: lengths by the scale, times by its root; loads by its cube.
     for name, factor in {"heave": 25, "pitch": 1, "mooring_bow": 25**3, "time": 5}.items():

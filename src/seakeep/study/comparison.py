@@ -394,7 +394,7 @@ def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset
     Dataset
         As :func:`seakeep.metrics.anrmse_differences` gives it, with the names of models and runs,
         and ``wave_period`` over ``run``: the mean zero-up-crossing period of the first wave input
-        over the forecast, s; NaN without one.
+        over the forecast, s; NaN without one; at full scale also ``scale_factor``.
     """
     first = next(iter(compared.values()))
     out = metrics.anrmse_differences(
@@ -404,6 +404,8 @@ def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset
     )
     runs = [each.run for each in first]
     periods = [wave_period(each.inputs) for each in first]
+    if first[0].full_scale is not None:
+        out["scale_factor"] = "run", [each.full_scale for each in first]
     return out.assign(wave_period=("run", periods, {"units": "s"})).assign_coords(
         model=list(compared), run=runs
     )
@@ -528,10 +530,13 @@ def _seconds(
     return length.value * (next(known, None) or campaign.encounter_period())
 
 
-TIMES = {"dt", "start", "encounter_period", "train_span", "test_span", "reads_input_until",
-         "input_predicted_from", "diverged_at"}  # fmt: skip
-LENGTHS = {"water_depth", "probe_offset", "probe_offset_spread"}
-"""Attributes of a run that are times and lengths."""
+ATTRIBUTES = {
+    "s": {"dt", "start", "encounter_period", "train_span", "test_span", "reads_input_until",
+          "input_predicted_from", "diverged_at"},
+    "m": {"water_depth", "probe_offset", "probe_offset_spread"},
+    "m/s": {"celerity"},
+}  # fmt: skip
+"""Attributes of a run by their unit."""
 
 
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
@@ -550,7 +555,7 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     -------
     Dataset
         Times and values at full scale; units keep their names. ``attrs["scale"]`` says
-        ``"full"``; times and lengths among the attributes are converted with them.
+        ``"full"``; times, lengths and speeds among the attributes are converted with them.
 
     Raises
     ------
@@ -573,17 +578,18 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     def factor_of(unit: str) -> tuple[float, str]:
         return froude_factor(unit or "1", scale, density_ratio), unit
 
-    clock, _ = factor_of("s")
-    out = _scaled(run, factor_of).assign_coords(time=run["time"] * clock)
+    out = _scaled(run, factor_of).assign_coords(time=run["time"] * factor_of("s")[0])
     out["time"].attrs = dict(run["time"].attrs)
     for variable in out.data_vars.values():
         if "x_position" in variable.attrs:
             variable.attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
-    for key in (TIMES | LENGTHS) & run.attrs.keys():
-        by, value = clock if key in TIMES else scale, run.attrs[key]
-        pair = isinstance(value, tuple | list)
-        out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+    for unit, keys in ATTRIBUTES.items():
+        by, _ = factor_of(unit)
+        for key in keys & run.attrs.keys():
+            value = run.attrs[key]
+            pair = isinstance(value, tuple | list)
+            out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
     if "status" in run.attrs:  # it names instants, and so does that of each member
         dt = float(np.diff(out["time"].values[:2]).sum())
         out.attrs["status"] = status_text(out.attrs, dt)
@@ -598,14 +604,14 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
 
 
 def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> xr.Dataset:
-    """Multiply channels, and the standard deviations among their attributes, by their factors."""
+    """Multiply channels, and the uncertainties among their attributes, by their factors."""
     out = run.copy()
     for name, channel in run.data_vars.items():
         unit = str(channel.attrs.get("units", ""))
         factor, shown = factor_of(unit)
         if factor == 1.0 or channel.dtype.kind not in "fiu":
             continue
-        known = {"training_std", "noise_std"} & set(channel.attrs)
+        known = {"training_std", "noise_std", "accuracy"} & set(channel.attrs)
         spreads = {key: factor * float(channel.attrs[key]) for key in known}
         out[name] = (channel * factor).assign_attrs(
             channel.attrs | spreads | ({"units": shown} if unit else {})
