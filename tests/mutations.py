@@ -519,6 +519,8 @@ CHANGES = {
         ("if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
         ("lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_lead_reads_waves_ahead_of_time"),
         ('run["time"] * factor_of("s")[0]', 'run["time"]', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('"m/s": {"celerity"}', '"s^2": {"celerity"}', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('"training_std", "noise_std", "accuracy"', '"training_std", "noise_std"', "signals/test_rigid_body.py::test_full_scale_run"),
         ("for each in (mean - truth, std)", "for each in (mean + truth, std)", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("y[at + 1 : at + steps + 1] for at", "y[at : at + steps] for at", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
     ],

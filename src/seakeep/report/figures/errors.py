@@ -15,6 +15,7 @@ from seakeep.report.style import (
     HEADING,
     PALETTE,
     SERIES,
+    WIDEST,
     Figure,
     Places,
     figure_style,
@@ -162,12 +163,12 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                 at = trend.sel(band=band, model=model)
                 quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
-                label = f"{model_words(model)}, growth {ratio_of(at).change()}"
+                label = f"{model_words(model)}, growth {ratio_of(at).growth()}"
                 axes.plot(time, at["error_mean"], label=label, **line)
             axes.set_title(words)
             axes.legend(fontsize=6.5, loc="upper left")
         row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
-        row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
+        row[0].set_ylabel(f"{wrapped(result.label_of(test), WIDEST)}\nε [measured SD]")
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
