@@ -295,7 +295,9 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
         at = table.sel({dim: name})
         reach = [np.abs(at[f"{key}_{bound}"] - at[key]) for bound in ("lower", "upper")]
         place = np.arange(len(labels)) + 0.7 * ((number + 0.5) / len(names) - 0.5)
-        style = {**SERIES[number % len(SERIES)], "linestyle": "none", "elinewidth": 0.9}
+        again, kind = divmod(number, len(SERIES))
+        style = {**SERIES[kind], "linestyle": "none", "elinewidth": 0.9}
+        style["fillstyle"] = "none" if again else "full"
         axes.errorbar(place, at[key], reach, label=plain_text(name), markersize=4, **style)
     axes.set_xticks(range(len(labels)), labels, fontsize=7)
 
