@@ -69,6 +69,7 @@ CHANGES = {
         ("model.at(parameter=varies.centre)", "model.at(parameter=varies.low)", "models/test_parametric.py::test_a_check_takes_the_middle_of_the_training"),
     ],
     "check/peaks.py": [
+        ('facts.get("scale") == "full"', "False", "check/test_peaks.py::test_statistics_at_full_scale_follow_froudes_law"),
         ("BAND * its_noise", "0 * its_noise", "check/test_peaks.py::test_noise_of_a_sensor_makes_no_peaks"),
     ],
     "check/residuals.py": [
@@ -534,9 +535,10 @@ CHANGES = {
         ("known.sum(axis=0), np.nan", "len(known), np.nan", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
         ("lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_lead_reads_waves_ahead_of_time"),
-        ('(clock * run[name])', 'run[name]', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('(factor_of("s")[0] * run[name])', 'run[name]', "signals/test_rigid_body.py::test_full_scale_run"),
         ('{"time", "diverged_at"} & set', '{"time"} & set', "signals/test_rigid_body.py::test_members_are_lost_at_instants_of_full_scale"),
-        ('"alignment_celerity"], "m/s")', '"alignment_celerity"], "m")', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('"m/s": {"celerity"', '"s^2": {"celerity"', "signals/test_rigid_body.py::test_full_scale_run"),
+        ('"training_std", "noise_std", "accuracy"', '"training_std", "noise_std"', "signals/test_rigid_body.py::test_full_scale_run"),
         ("for each in (mean - truth, std)", "for each in (mean + truth, std)", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("y[at + 1 : at + steps + 1] for at", "y[at : at + steps] for at", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
     ],

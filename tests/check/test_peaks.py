@@ -8,6 +8,7 @@ from seas import sea
 
 from seakeep import HankelDMDc, check
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
+from seakeep.study import to_full_scale
 
 
 def sea_run(height=0.04, period=2.0, seed=0, **attrs):
@@ -72,6 +73,16 @@ def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
     assert 0 <= found.divergence < 0.01  # the model follows the sea
     ranked = found.peak.sel(kind="forecast").values
     assert np.all(np.diff(ranked[np.isfinite(ranked)]) <= 0)
+
+
+def test_statistics_at_full_scale_follow_froudes_law(model, train):
+    run = sea_run(seed=3, scale_factor=36.0)
+    own = model.settings.fit({"train": to_full_scale(train, 36.0)}, ["heave"], ["eta"])
+    found = check.statistics(own, {"test": to_full_scale(run, 36.0)})
+    expected = check.statistics(model, {"test": run})
+    assert found.attrs["duration"] == pytest.approx(3 * 3600)
+    for key, factor in {"extreme": 36.0, "mean": 36.0, "zero_crossing_period": 6.0}.items():
+        assert found[key].values == pytest.approx(factor * expected[key].values, rel=1e-6)
 
 
 def test_noise_of_a_sensor_makes_no_peaks(model):

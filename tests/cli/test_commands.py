@@ -62,9 +62,11 @@ def test_the_example_of_each_help_runs(verb, run, place, monkeypatch):
         monkeypatch.setattr("seakeep.tank.play.play", lambda *_, **__: {})  # as tests/tank does
     out, _ = run(f"{verb} --help")
     examples = re.findall(
-        r"(?:Example|An ensemble|Two models|In service): (seakeep .*?)(?:\n\n|\Z)", out, re.DOTALL
+        r"(?:Example|An ensemble|A model|Two models|In service): (seakeep .*?)(?:\n\n|\Z)",
+        out,
+        re.DOTALL,
     )
-    assert len(examples) == {"fit": 2, "forecast": 2, "compare": 3}.get(verb, 1)
+    assert len(examples) == {"fit": 2, "forecast": 2, "compare": 3, "info": 2}.get(verb, 1)
     for example in examples:
         words = " ".join(example.split())
         if verb == "compare" and "--steps" not in words:
@@ -266,6 +268,13 @@ def test_no_output_replaces_an_input_or_a_file_of_others(line, kept, run, place,
     assert (place / kept).read_bytes() == before
 
 
+def test_info_describes_a_model_file(run, place):
+    out, err = run("info model.nc")
+    assert out == f"{seakeep.load_model(place / 'model.nc').summary()}\n"
+    assert not err
+    assert "is a folder" in run("info .", 2)[1]
+
+
 def test_datasets_lists_origin_licence_and_state(run, monkeypatch):
     monkeypatch.delenv("SEAKEEP_DATA_DIR", raising=False)
     out, _ = run("datasets")
@@ -279,7 +288,7 @@ def test_full_scale_by_froudes_law(run, place):
     edit(scaled, ("[campaign]", "[campaign]\nscale_factor = 25.0"))
     run(command.format(scaled, "model_scale"))
     _, err = run(command.format(scaled, "full_scale") + " --full-scale")
-    assert "Times are at full scale (1:25); --start and --steps at model scale." in err
+    assert "at full scale (1:25); notes, --start and --steps are at model scale." in err
     small, full = (xr.load_dataset(place / f"{n}_scale.nc") for n in ("model", "full"))
     # Froude: lengths by the scale, times by its root; loads by its cube.
     for name, factor in {"heave": 25, "pitch": 1, "mooring_bow": 25**3, "time": 5}.items():

@@ -4,10 +4,13 @@ import errno
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tutorial_study import edit
 
+from seakeep.errors import RequestError
 from seakeep.study import read_study, run_study
+from seakeep.study.run import compute, units_of
 from seakeep.study.store import UnitFolder
 
 pytest.importorskip("matplotlib")
@@ -82,6 +85,23 @@ def test_each_mistake_has_its_message_and_its_exit_status(
     for each in words:
         assert each in told
     assert "Traceback" not in told
+
+
+def test_a_unit_that_fails_says_what_is_kept_and_how_to_go_on(study_folder, monkeypatch, study):
+    def fails(plan, facts, unit, *more, original=compute):
+        if unit == units_of(plan)[1]:
+            raise RequestError("the second fails.")
+        return original(plan, facts, unit, *more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("seakeep.study.run.compute", fails)
+        told = study(1)
+    assert "training set 't00', model" in told
+    assert "the second fails. What was finished is kept (1 of 4 units): the same command" in told
+    before = units_in(study_folder)
+    assert len(before) == 1
+    result = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
+    assert np.isfinite(result.tests["unseen"]["error"]).any()
 
 
 def filling(room, opened=Path.open):

@@ -1,6 +1,7 @@
 """The comparison's tables, files and figures."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -162,8 +163,39 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     )
     rows = rows_of(write_differences(table, tmp_path / "d.csv"))
     assert [row["run"] for row in rows] == [*runs, *runs, "", ""]
+    large = {k: [at_full_scale(each, 4.0) for each in of] for k, of in found.items()}
+    table = difference_table(large)
+    assert_allclose(table["wave_period"], [4.0, 2.0], rtol=1e-3)
+    assert next(difference_blocks(table)).title.endswith(": ANRMSE, full scale (1:4)")
+    rows = rows_of(write_differences(table, tmp_path / "full.csv"))
+    assert {row["scale_factor"] for row in rows if row["run"]} == {"4.0"}
     (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))
     assert only.title == "long: change of ANRMSE from ours"
+
+
+def test_names_of_ten_runs_and_long_ones_of_channels_do_not_meet():
+    pytest.importorskip("matplotlib")
+    from seakeep.report.figures.checks import coherence
+    from seakeep.report.figures.errors import error_figure
+
+    runs = [f"Run {k}, irregular_Hs0.06_Tp{k}_with_wind and current" for k in range(10)]
+    found = {name: [waves_of(1.0, 0.9, run) for run in runs] for name in ("ours", "theirs")}
+    figure = error_figure(difference_table(found))
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    places = [label.get_window_extent() for label in axes.get_xticklabels()]
+    assert all(left.x1 < right.x0 for left, right in pairwise(places))
+    assert axes.get_window_extent().height > 0.4 * figure.bbox.height
+    names = ["vertical velocity at the moonpool (MRU 5)", "force_of_the_forward_portside_line_lc_4"]
+    ones = xr.DataArray(np.ones((2, 3)), dims=("state", "frequency"))
+    result = xr.Dataset(
+        {"ordinary": ones.expand_dims("input"), "spectrum": ones, "multiple": ones},
+        coords={"state": names, "input": ["eta"], "frequency": [0.1, 0.2, 0.3]},
+    )
+    figure = coherence(result)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        assert axes.yaxis.label.get_window_extent().height <= axes.get_window_extent().height
 
 
 @pytest.mark.parametrize(("lead_time", "words"), [(0.5, "0.500"), (2.0, "at least 2.000")])
@@ -217,7 +249,12 @@ def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path)
     table = comparison_table([large])
     rows = rows_of(write_comparison({"m": table}, tmp_path / "t.csv"))
     assert {(row["scale"], row["scale_factor"]) for row in rows} == {("full", "120.0")}
-    assert "full scale (1:120)" in next(comparison_blocks(table)).title
+    extremes = "r1: extremes, full scale (1:120)"
+    titles = [each.title for each in comparison_blocks(table)]
+    assert titles[::2] == ["r1: forecast against measurement, full scale (1:120)", extremes]
+    titles = [each.title for each in model_blocks({"ours": table, "theirs": table})]
+    assert titles[0] == "r1: models against measurement, full scale (1:120)"
+    assert titles[2] == "r1: extremes of ours, full scale (1:120)"
     rows = rows_of(write_forecast(large.forecast, tmp_path / "f.csv"))
     assert {row["scale_factor"] for row in rows} == {"120.0"}
     assert "scale" not in write_forecast(small.forecast, tmp_path / "s.csv").read_text()

@@ -121,7 +121,7 @@ select = { horizon = 5, memory = true }
     whole = campaign(tmp_path, stated + model, "[campaign]\nencounter_period = 0.4\n" + runs)
     fitted = fit_campaign(whole)
     assert fitted.settings.kind == taken
-    assert "kind = 'fir' errs 0." in fitted.selection
+    assert "kind = 'fir' errs 0." in fitted.summary()
     assert np.isfinite(fitted.forecast(whole.prepare()["a"], 5.0, 20)["heave"]).all()
 
 

@@ -13,7 +13,7 @@ from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
-from seakeep.models.labelled import Span, channel_matrix, run_step
+from seakeep.models.labelled import Span, channel_matrix, nearest_sample, run_step
 from seakeep.models.observables import at_once
 from seakeep.models.registry import is_linear
 from seakeep.signals.time_axis import inside, stretches
@@ -266,7 +266,7 @@ def samples_in(
     if start is None:
         first = time[min(max(history - 1, _waves_come(run, names)), time.size - 1)]
         start = max(span[0], first)
-    return int(np.argmin(np.abs(time - start))), last
+    return nearest_sample(time, start, str(run.attrs.get("run", "the run"))), last
 
 
 def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:

@@ -63,7 +63,8 @@ def statistics(
     waves = irregular(runs, "a statistic of peaks")
     known = free_runs(model, waves, free)
     if duration is None:
-        scale = next(iter(waves.values())).attrs.get("scale_factor", 1.0)
+        facts = next(iter(waves.values())).attrs
+        scale = 1.0 if facts.get("scale") == "full" else facts.get("scale_factor", 1.0)
         duration = 3600 * HOURS / np.sqrt(scale)
     moved = {kind: deviations(known, kind) for kind in KINDS}
     parts = []

@@ -6,6 +6,7 @@ import platform
 import sys
 import traceback
 from importlib import metadata
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -58,11 +59,25 @@ _PACKAGES = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "pydantic
              "matplotlib", "control", "numba")  # fmt: skip
 
 
-def info() -> None:
-    """Print versions and environment, for a bug report.
+def info(
+    model: Annotated[
+        Path | None, typer.Argument(help="Model file to describe.", metavar="MODEL.nc")
+    ] = None,
+) -> None:
+    """Describe a model file, or print versions for a bug report.
+
+    Of a model: kind, channels, settings, how they were chosen, training, calibrated band and
+    stability, as seakeep fit printed them.
 
     Example: seakeep info
+
+    A model: seakeep info model.nc
     """
+    if model:
+        from seakeep.models import load_model
+
+        typer.echo(load_model(model).summary())
+        return
     typer.echo(f"seakeep {metadata.version('seakeep')}")
     typer.echo(f"Python {platform.python_version()} on {platform.platform()}")
     typer.echo(f"cores {os.cpu_count()}")

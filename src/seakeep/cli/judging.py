@@ -115,6 +115,7 @@ def forecast(
 
     identified = load_model(model)
     read = read_campaign(campaign)
+    scale = _scale(read) if full_scale else None
     check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
     band_options = _band({str(model): identified}, level, band, scheduler, members)
     channels = [*identified.states, *identified.inputs]
@@ -137,11 +138,8 @@ def forecast(
                 result = identified.forecast_summary(prepared, first, count, **how, **band_options)
     else:
         result = identified.forecast(prepared, first, count, ahead=ahead)
-    scaled = ""
-    if full_scale:
-        scale = _scale(read)
+    if scale:
         result = to_full_scale(result, scale)
-        scaled = f" Times are at full scale (1:{scale:g}); --start and --steps at model scale."
     if degrees:
         result = with_degrees(result)
     write_forecast(result, out)
@@ -150,7 +148,7 @@ def forecast(
     reads = look_ahead_words(result.attrs.get("reads_input_until", 0.0))
     say(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
+        f"t = {begin} s, status {status}{reads and f'; {reads}'}."
     )
     members_left = result.sizes.get("member", 0) - result.attrs.get("diverged", 0)
     usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
@@ -250,6 +248,7 @@ def compare(
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
+    scale = _scale(read) if full_scale else None
     with executor_of(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         comparisons = compare_models(
             fitted,
@@ -262,7 +261,6 @@ def compare(
             **shown,
             executor=executor,
         )
-    scale = _scale(read) if full_scale else None
     comparisons = {
         n: [_displayed(each, scale, degrees) for each in of] for n, of in comparisons.items()
     }
@@ -377,13 +375,16 @@ def _draw(
 
 
 def _scale(campaign: Campaign) -> float:
+    """Scale factor of a campaign; says what is at which scale."""
     general = campaign.settings.campaign
     if "scale_factor" not in general.model_fields_set:
         raise RequestError(
             f"--full-scale needs the scale factor, and {campaign.path} states none. Add "
             "scale_factor (full-scale length over model length) to [campaign]."
         )
-    return general.scale_factor
+    scale = general.scale_factor
+    say(f"Results are at full scale (1:{scale:g}); notes, --start and --steps are at model scale.")
+    return scale
 
 
 def _band(
@@ -435,7 +436,8 @@ def check(
     The page starts with the error over the tests beside that of baselines, and a verdict on each
     channel. It shows the model's response to waves beside the measured one, with uncertainties, its
     error beside the least error that its inputs allow, and its modes, residuals and statistics.
-    It names the checks that these runs do not allow, with the reason.
+    It names the checks that these runs do not allow, with the reason. All is at model scale, but
+    for the extreme of three hours at full scale.
 
     Example: seakeep check model.nc docs/tutorial/campaign.toml -o check
     """

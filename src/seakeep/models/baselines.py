@@ -80,7 +80,7 @@ class Constant(LinearKind, Plain):
     ridge: float = _fixed(0.0)
     history: History = _fixed("inside")
     ridge_scale: RidgeScale = _fixed("absolute")
-    standardize: bool = _fixed(False)
+    standardize: bool = _fixed(True)
     alignment: None = _fixed(None)
     lead: int = _fixed(0)
     observables: tuple[()] = _fixed(())
@@ -95,8 +95,7 @@ class Constant(LinearKind, Plain):
         """
         named = as_runs(runs)
         spec = self.resolved_in(named, [])
-        moments = HankelSettings(0, 0, 0.0, spec.window, self.history)
-        data = gather(named, states, [], stop, moments)
+        data = gather(named, states, [], stop, spec)
         size = len(data.signature.states)
         solution = Solution(self.factor * np.eye(size), "svd", 0.0, size * bool(self.factor))
         return HankelDMDcModel.fitted(spec, data, solution, named)

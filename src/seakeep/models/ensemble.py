@@ -488,16 +488,19 @@ class HankelEnsemble(Model):
                 run,
                 windows,
                 middle,
-                ensemble=json.dumps(self.origin),
                 diverged=int(np.count_nonzero(gone >= 0)),
-                members=self.n_members,
+                **self._facts,
             ),
         )
 
     def _of_members(self, forecast: xr.Dataset) -> xr.Dataset:
         """A forecast of all members, with their numbers and where they come from."""
-        attrs = {"ensemble": json.dumps(self.origin)}
-        return forecast.assign_coords(member=np.arange(self.n_members)).assign_attrs(attrs)
+        return forecast.assign_coords(member=np.arange(self.n_members)).assign_attrs(self._facts)
+
+    @property
+    def _facts(self) -> dict[str, Any]:
+        """Attributes of each forecast: where the members come from, and how many they are."""
+        return {"ensemble": json.dumps(self.origin), "members": self.n_members}
 
     def summarize_windows(
         self,
@@ -536,7 +539,7 @@ class HankelEnsemble(Model):
         values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
         diverged = ("window", (lost >= 0).sum(axis=0))
         forecast = windows_dataset(self.signature, windows, values, "statistic", diverged=diverged)
-        return forecast.assign_coords(statistic=statistic).assign_attrs(counts)
+        return forecast.assign_coords(statistic=statistic).assign_attrs(self._facts | counts)
 
     def _banded(
         self,
@@ -552,11 +555,7 @@ class HankelEnsemble(Model):
         """
         level = fraction(level, "level")
         check_choice("band", band, get_args(Band))
-        attrs: dict[str, Any] = {
-            "ensemble": json.dumps(self.origin),
-            "level": level,
-            "members": self.n_members,
-        }
+        attrs: dict[str, Any] = {"level": level}
         bounds, calibrated = "", None
         if band == "calibrated":
             calibrated = calibrated_for(self.calibration, level)

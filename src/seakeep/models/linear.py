@@ -540,9 +540,9 @@ class HankelDMDcModel(Model):
             )
         if read := [each.channel for each in self.signature.readouts if each.acts]:
             raise RequestError(
-                f"the model reads {', '.join(read)} off its other states, which no linear "
-                "system can represent. Use forecast_arrays, or fit the model without "
-                "readouts to export it."
+                f"the model reads {', '.join(read)} off its other states, or rests it on a floor, "
+                "which no linear system can represent. Export C, an FMU or an ONNX graph, use "
+                "forecast_arrays, or fit the model with readouts = {} in [model]."
             )
         return export.matrices(self.A, self.B, self.signature)
 
@@ -554,8 +554,11 @@ class HankelDMDcModel(Model):
         str
             A few lines; reading it computes the eigenvalues.
         """
+        chosen = []
+        if self.selection:
+            chosen.append("  chosen        " + self.selection.replace("\n", "\n  "))
         if self.settings.title:
-            return "\n".join([f"{self.settings.title}, dt {self.dt:g} s", *self.lines()])
+            return "\n".join([f"{self.settings.title}, dt {self.dt:g} s", *self.lines(), *chosen])
         rows = "exact" if self.settings.delay_rows == "exact" else "regressed"
         memory = ""
         if blocks := self.settings.blocks:
@@ -567,9 +570,8 @@ class HankelDMDcModel(Model):
             f"Hankel DMD with control: {counted(len(self.states), 'state')}, "
             f"{counted(len(self.inputs), 'input')}, dt {self.dt:g} s",
             *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}{memory}"),
+            *chosen,
         ]
-        if self.selection:
-            lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         shown = self
         if (varies := self.variation) is not None:
             lines.append(

@@ -241,7 +241,7 @@ class Claims(Evidence):
         for act in (self, self.raw):
             at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
             growths.append([ratio_of(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)])
-        texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
+        texts = (" and ".join(each.growth() for each in of_act) for of_act in growths)
         within = [v for e in growths[0] for v in (e.below(1 + AGED), e.above(1 - AGED))]
         return "{}; act (b): {}".format(*texts), all_of(within)
 

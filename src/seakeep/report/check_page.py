@@ -18,9 +18,9 @@ from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
     WORDS,
+    Interval,
     Number,
     Table,
-    change,
     entries,
     interval,
     number,
@@ -131,7 +131,7 @@ def _verdict(one: xr.Dataset) -> tuple[float, str]:
 def _change(one: xr.Dataset, baseline: str) -> Number:
     """Interval of the change from a baseline."""
     at = one.sel(model=baseline)
-    return change(1 + at["change_lower"], 1 + at["change_upper"])
+    return Interval(*(1 + float(at[f"change{end}"]) for end in ("", "_lower", "_upper"))).cells()[1]
 
 
 def _by_run(result: xr.Dataset, one: str) -> Table:

@@ -44,9 +44,7 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
     for at in entries(table, "run"):
-        title = "forecast against measurement"
-        if "scale" in at:
-            title += f", full scale (1:{float(at['scale_factor']):g})"
+        title = f"forecast against measurement{_scale_words(at)}"
         if "level" in at:
             title += f", {band_words(at['level'].item(), at['band'].item())}"
         columns = [
@@ -66,6 +64,13 @@ def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
         yield _extremes(at, "extremes")
 
 
+def _scale_words(table: xr.Dataset) -> str:
+    """Scale for a title; nothing at model scale."""
+    if "scale_factor" not in table:
+        return ""
+    return f", full scale (1:{float(table['scale_factor'].max()):g})"
+
+
 def _by_channel(
     at: xr.Dataset, name: str, title: str, columns: Iterable[Iterable[str]], note: str = ""
 ) -> Table:
@@ -82,7 +87,7 @@ def _extremes(at: xr.Dataset, title: str) -> Table:
     for key, head in WORDS["extremes"].items():
         if key in at:
             columns.append([head, *map(short, at[key])])
-    return _by_channel(at, "extremes", title, columns)
+    return _by_channel(at, "extremes", f"{title}{_scale_words(at)}", columns)
 
 
 def _note(at: xr.Dataset) -> str:
@@ -114,7 +119,7 @@ def model_blocks(tables: Datasets) -> Iterator[Table]:
                 status.append(f"{model}: {at['status'].values}")
             if words := look_ahead_words(float(at["look_ahead"])):
                 ahead.append(f"{model} {words}")
-        title = f"{run}: models against measurement"
+        title = f"{run}: models against measurement{_scale_words(first)}"
         yield Table(f"models_{run}", title, heads, rows, "; ".join(status + ahead))
         errors = ([model, *numbers(each["nrmse"].sel(run=run))] for model, each in tables.items())
         at = first.sel(run=run)
@@ -134,7 +139,8 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         ]
         rows.append(("mean", "", *numbers(table["all_anrmse"])))
         heads = ("run", "waves, s", *models)
-        yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
+        title = f"{of} by wave period: ANRMSE{_scale_words(table)}"
+        yield Table("by_run", title, heads, rows, averages=[len(runs)])
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
         cells = ratio_of(at, "all_").cells() if changes else ("", "", "")
@@ -178,7 +184,7 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     """Write errors of several models as CSV, a row per run and model, and per model for all."""
     of_all = {name: str(name)[4:] for name in table.data_vars if str(name).startswith("all_")}
     every = table[[*of_all]].rename(of_all).expand_dims(run=[""])
-    each = table[[*of_all.values(), "wave_period"]]
+    each = table.drop_vars(of_all)
     both = [part.to_dataframe().reset_index() for part in (each, every)]
     return _write(both, ["run", "wave_period", "model"], path)
 

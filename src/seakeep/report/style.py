@@ -59,6 +59,8 @@ HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 
 WIDEST = 18
 """Letters of a label on one line: what the height of a panel holds."""
+NARROW = 14
+"""Letters of a label on one line beside others, or between panels."""
 NARROWEST = 7.5
 """Inches: a page stretches figures to its width, and a legend needs room."""
 
@@ -198,18 +200,28 @@ def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     """
     channel = canonical_channel(name)
     symbol = f"${channel.symbol}$ " if channel else ""
-    words = plain_text(long_name_of(name, long_name))
+    words = wrapped(plain_text(long_name_of(name, long_name)), WIDEST)
+    return f"{words}\n{symbol}[{shown_unit(units) or '?'}]"
+
+
+def wrapped(words: str, widest: int = NARROW) -> str:
+    r"""Words in as few lines as fit, of lengths as equal as they can be.
+
+    Examples
+    --------
+    >>> wrapped("force of the forward line"), wrapped("IRR_Hs0.06_Tp1.67_b")
+    ('force of the\nforward line', 'IRR_Hs0.06_Tp1\n.67_b')
+    """
     wraps = [
-        textwrap.wrap(words, width, break_long_words=width == WIDEST, break_on_hyphens=False)
-        for width in range(1, WIDEST + 1)
+        textwrap.wrap(words, width, break_long_words=width == widest, break_on_hyphens=False)
+        for width in range(1, widest + 1)
     ]
-    # As few lines as fit, of lengths as equal as they can be.
-    lines = min((each for each in wraps if max(map(len, each)) <= WIDEST), key=len)
-    return "\n".join([*lines, f"{symbol}[{shown_unit(units) or '?'}]"])
+    lines = min((each for each in wraps if max(map(len, each)) <= widest), key=len)
+    return "\n".join(lines)
 
 
 def short_label(channel: str) -> str:
-    r"""Symbol of a channel for a crowded axis, else its name.
+    r"""Symbol of a channel for a crowded axis, else its name in lines.
 
     Examples
     --------
@@ -217,7 +229,7 @@ def short_label(channel: str) -> str:
     ('$\\dot{\\theta}$', 'torque')
     """
     known = canonical_channel(channel)
-    return f"${known.symbol}$" if known else channel.replace("_", " ")
+    return f"${known.symbol}$" if known else wrapped(channel.replace("_", " "))
 
 
 def plain_text(words: str) -> str:

@@ -304,21 +304,41 @@ class Interval(NamedTuple):
         value, low, high = (each(factor * x) for x in self)
         return Number(f"{value}{unit}" + f" [{low}, {high}]" * bool(np.isfinite(self.lower)))
 
-    def cells(self) -> tuple[str, str, str]:
+    @property
+    def is_multiple(self) -> bool:
+        """Whether a ratio is stated as how many times, and not in percent: from 2 on."""
+        return round(self.value, 2) >= 2
+
+    def cells(self) -> tuple[Number, Number, str]:
         """Cells of an error over another: its change, the bounds, and what they say.
 
         Examples
         --------
-        >>> Interval(0.8, 0.7, 0.9).cells(), Interval(1.1, 0.9, 1.3).cells()[2]
-        (('−20 %', '−30 to −10 %', 'better'), 'cannot tell')
+        >>> Interval(0.8, 0.7, 0.9).cells(), Interval(1.9, 0.9, 2.3).cells()
+        (('−20 %', '−30 to −10 %', 'better'), ('+90 %', '−10 to +130 %', 'cannot tell'))
+        >>> Interval(2.57, 1.6, 14.57).cells()
+        ('2.57 times', '1.6 to 14.6 times', 'worse')
         """
         words = {True: "better", False: "worse", None: "cannot tell"}[self.below(1.0)]
         if max(abs(self.lower - 1.0), abs(self.upper - 1.0)) < 0.005:
             words = "as good"
-        return change(self.value), change(self.lower, self.upper), words
+        form, unit = (TIMES, "times") if self.is_multiple else (_relative, "%")
+        texts = (to(ratios, form) for ratios in (self[:1], self[1:]))
+        value, bounds = (each if each == MISSING else Number(f"{each} {unit}") for each in texts)
+        return value, bounds, words
 
     def change(self) -> Number:
-        """Text of a ratio as a relative change."""
+        """Text of a ratio as a change.
+
+        Examples
+        --------
+        >>> Interval(0.8, 0.7, 1.2).change(), Interval(4.4, 1.9, 9.0).change()
+        ('-20 % [-30, +20]', '4.4 times [1.9, 9]')
+        """
+        return self.text(TIMES, " times") if self.is_multiple else self.growth()
+
+    def growth(self) -> Number:
+        """Text of a ratio as a relative change, in percent."""
         return Interval(*(x - 1 for x in self)).text(signed, " %", 100.0)
 
     def part(self) -> Number:
@@ -346,20 +366,12 @@ def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:
     return Number(" ± ".join(numbers([round(each, places) for each in both], max(places, 0))))
 
 
-def change(*ratios: SupportsFloat) -> Number:
-    """Text of one error over another, or of an interval: in percent, or how many times from 2 on.
+TIMES = partial(short, digits=3)
 
-    Examples
-    --------
-    >>> change(0.4), change(1.1), change(14.57), change(2.1, 3.05), change(float("nan"))
-    ('−60 %', '+10 %', '14.6 times', '2.1 to 3.05 times', '–')
-    """
-    values = [float(each) for each in ratios]
-    if not np.isfinite(values).all():
-        return MISSING
-    if round(max(values), 2) >= 2:
-        return Number(f"{to(values, lambda each: short(each, 3))} times")
-    return Number(f"{to([100 * (each - 1) for each in values], signed)} %".replace("-", "−"))
+
+def _relative(ratio: SupportsFloat) -> Number:
+    """Change of a ratio from one, without the sign of percent."""
+    return Number(signed(100 * (float(ratio) - 1)).replace("-", "−"))
 
 
 def band_words(level: float, kind: str | None) -> str:

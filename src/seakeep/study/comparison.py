@@ -394,7 +394,7 @@ def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset
     Dataset
         As :func:`seakeep.metrics.anrmse_differences` gives it, with the names of models and runs,
         and ``wave_period`` over ``run``: the mean zero-up-crossing period of the first wave input
-        over the forecast, s; NaN without one.
+        over the forecast, s; NaN without one; at full scale also ``scale_factor``.
     """
     first = next(iter(compared.values()))
     out = metrics.anrmse_differences(
@@ -404,6 +404,8 @@ def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset
     )
     runs = [each.run for each in first]
     periods = [wave_period(each.inputs) for each in first]
+    if first[0].full_scale is not None:
+        out["scale_factor"] = "run", [each.full_scale for each in first]
     return out.assign(wave_period=("run", periods, {"units": "s"})).assign_coords(
         model=list(compared), run=runs
     )
@@ -528,13 +530,13 @@ def _seconds(
     return length.value * (next(known, None) or campaign.encounter_period())
 
 
-SCALED = {
-    **dict.fromkeys(["dt", "start", "encounter_period", "train_span", "test_span",
-                     "reads_input_until", "input_predicted_from", "diverged_at"], "s"),
-    **dict.fromkeys(["water_depth", "probe_offset", "probe_offset_spread"], "m"),
-    **dict.fromkeys(["celerity", "alignment_celerity"], "m/s"),
+ATTRIBUTES = {
+    "s": {"dt", "start", "encounter_period", "train_span", "test_span", "reads_input_until",
+          "input_predicted_from", "diverged_at"},
+    "m": {"water_depth", "probe_offset", "probe_offset_spread"},
+    "m/s": {"celerity", "alignment_celerity"},
 }  # fmt: skip
-"""Units of attributes of a run, or of a forecast."""
+"""Attributes of a run, or of a forecast, by their unit."""
 
 
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
@@ -553,7 +555,7 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     -------
     Dataset
         Times and values at full scale; units keep their names. ``attrs["scale"]`` says
-        ``"full"``; times and lengths among the attributes are converted with them.
+        ``"full"``; times, lengths and speeds among the attributes are converted with them.
 
     Raises
     ------
@@ -576,18 +578,19 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     def factor_of(unit: str) -> tuple[float, str]:
         return froude_factor(unit or "1", scale, density_ratio), unit
 
-    clock, _ = factor_of("s")
     out = _scaled(run, factor_of)
     for name in {"time", "diverged_at"} & set(run.coords):
-        out[name] = (clock * run[name]).assign_attrs(run[name].attrs)
+        out[name] = (factor_of("s")[0] * run[name]).assign_attrs(run[name].attrs)
     for variable in out.data_vars.values():
         if "x_position" in variable.attrs:
             variable.attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
-    for key in SCALED.keys() & run.attrs.keys():
-        by, value = factor_of(SCALED[key])[0], run.attrs[key]
-        pair = isinstance(value, tuple | list)
-        out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+    for unit, keys in ATTRIBUTES.items():
+        by, _ = factor_of(unit)
+        for key in keys & run.attrs.keys():
+            value = run.attrs[key]
+            pair = isinstance(value, tuple | list)
+            out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
     if "outside_training" in run.attrs:
         out.attrs["outside_training"] = f"at model scale: {run.attrs['outside_training']}"
     if "status" in run.attrs:  # it names instants, and so does that of each member
@@ -604,7 +607,7 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
 
 
 def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> xr.Dataset:
-    """Multiply channels, and the deviations among their attributes, by their factors."""
+    """Multiply channels, and the uncertainties among their attributes, by their factors."""
     out = run.copy()
     for name, channel in run.data_vars.items():
         unit = str(channel.attrs.get("units", ""))

@@ -116,14 +116,16 @@ def fit_campaign(
     spec, prepared, runs, stop = read_training(campaign, model, progress)
     dt = step_of(prepared)
     channels = list(settings.states), list(settings.inputs)
-    open_spec, rival = left_open(spec), None
+    open_spec, choice = left_open(spec), None
     how: dict[str, Any] = {"executor": executor, "progress": progress} if open_spec else {}
     if open_spec and "kind" not in settings.model_fields_set:
         choice = open_spec.settled(runs, *channels, stop, **how)
-        how, rival = {"selected": choice}, choice.rival
-    identified: Any = (rival or spec).fit(runs, *channels, stop, **({} if rival else how))
-    if rival:
-        identified = replace(identified, selection=choice.note)
+        how = {"selected": choice}
+    identified: Any
+    if choice and choice.rival:
+        identified = replace(choice.rival.fit(runs, *channels, stop), selection=choice.note)
+    else:
+        identified = spec.fit(runs, *channels, stop, **how)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     # Other tests are not prepared for a warning.

@@ -203,10 +203,12 @@ def _computed(
                 done[unit] = groups
                 name = plan.training[unit.training].name
                 report(len(done), len(units), f"{unit.model}, training set {name}")
-    except WorkerLostError as error:
-        raise WorkerLostError(
-            f"{error} What was finished is kept: the same command continues where it stopped."
-        ) from None
+    except (DataError, WorkerLostError) as error:
+        raise type(error)(
+            f"{error} What was finished is kept ({len(done)} of {len(units)} units): the same "
+            "command continues where it stopped. Other settings are another study, for another "
+            "folder."
+        ) from error
     return {unit: done[unit] for unit in units}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ from seakeep.report.style import (
     HEADING,
     PALETTE,
     SERIES,
+    WIDEST,
     Figure,
     Places,
     figure_style,
@@ -27,13 +27,12 @@ from seakeep.report.style import (
     panels,
     plain_text,
     short_label,
+    wrapped,
 )
 from seakeep.report.tables import ratio_of
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
-NARROW = 14
-"""Letters of a test set's label on one line."""
 FEWEST = 10
 """Values from which on a density is drawn; of fewer, points and box alone."""
 HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\")
@@ -52,7 +51,7 @@ LOWEST = 0.8
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
     figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
-    labels = [_narrow(result.label_of(test)) for test in tests]
+    labels = [wrapped(result.label_of(test)) for test in tests]
     for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
         columns = {
             model: [average_of(result.errors(test, model, measure)) for test in tests]
@@ -148,15 +147,6 @@ def _draw_boxes(
         axes.set_ylim(bottom=0)
 
 
-def _narrow(label: str) -> str:
-    """A label in lines, parted behind its commas first."""
-    if len(label) <= NARROW:
-        return label
-    return "\n".join(
-        textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").splitlines()
-    )
-
-
 @figure_style()
 def error_over_time_figure(result: StudyResult) -> Figure:
     """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles."""
@@ -173,12 +163,12 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                 at = trend.sel(band=band, model=model)
                 quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
-                label = f"{model_words(model)}, growth {ratio_of(at).change()}"
+                label = f"{model_words(model)}, growth {ratio_of(at).growth()}"
                 axes.plot(time, at["error_mean"], label=label, **line)
             axes.set_title(words)
             axes.legend(fontsize=6.5, loc="upper left")
         row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
-        row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
+        row[0].set_ylabel(f"{wrapped(result.label_of(test), WIDEST)}\nε [measured SD]")
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
@@ -264,10 +254,10 @@ def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
     Figure
     """
     labels = list(map(short_label, table["channel"].values))
-    figure, (place,) = panels(axes, 1, 1, (max(4.0, 1.2 + 0.8 * len(labels)), 2.8))
+    figure, (place,) = panels(axes, 1, 1, (max(4.0, 1.2 + 0.9 * len(labels)), 2.8))
     _draw_points(place, table.transpose("run", ...), "run", "nrmse", labels)
     place.set_ylim(bottom=0)
-    place.set_ylabel("NRMSE [SD], 95 % intervals")
+    place.set_ylabel("NRMSE [SD], 95 %")
     if axes is None and table.sizes["run"] > 1:
         legend_outside(place)
     return figure
@@ -281,19 +271,19 @@ def error_figure(table: xr.Dataset) -> Figure:
     """
     table = table.sortby("wave_period")
     labels = [
-        plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+        plain_text(wrapped(str(run))) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
         for run, period in table["wave_period"].to_series().items()
     ]
-    figure = new_figure(max(4.5, 1.5 + 0.8 * len(labels)), 3.2)
+    figure = new_figure(max(4.5, 1.5 + 0.9 * len(labels)), 3.4)
     axes = figure.subplots()
     _draw_points(axes, table, "model", "anrmse", labels)
-    axes.tick_params(axis="x", labelrotation=45 if len(labels) > 8 else 0)
     finite = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
     if finite.size and 0.0 < 10.0 * finite.min() < finite.max():
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0.0)
-    axes.set(xlabel="run, and mean period of its waves", ylabel="ANRMSE [SD], 95 %")
+    where = " at full scale" * ("scale_factor" in table)
+    axes.set(xlabel=f"run, and mean period of its waves{where}", ylabel="ANRMSE [SD], 95 %")
     legend_outside(axes)
     return figure
 
@@ -305,9 +295,11 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
         at = table.sel({dim: name})
         reach = [np.abs(at[f"{key}_{bound}"] - at[key]) for bound in ("lower", "upper")]
         place = np.arange(len(labels)) + 0.7 * ((number + 0.5) / len(names) - 0.5)
-        style = {**SERIES[number % len(SERIES)], "linestyle": "none", "elinewidth": 0.9}
+        again, kind = divmod(number, len(SERIES))
+        style = {**SERIES[kind], "linestyle": "none", "elinewidth": 0.9}
+        style["fillstyle"] = "none" if again else "full"
         axes.errorbar(place, at[key], reach, label=plain_text(name), markersize=4, **style)
-    axes.set_xticks(range(len(labels)), labels)
+    axes.set_xticks(range(len(labels)), labels, fontsize=7)
 
 
 @figure_style()

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from seakeep.conventions import displayed, is_elevation
 from seakeep.files import write_text
+from seakeep.models.labelled import nearest_sample
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
@@ -153,8 +154,9 @@ def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any
             nrmse = [round(float(e), 3) if e == e else None for e in errors[training, window]]
             own = {key: packed(values[training, window]) for key, values in parts.items()}
             models[model] = {**own, "nrmse": nrmse}
-        run = result.prepared[data["run"].values[window]]
-        at = np.argmin(np.abs(run["time"].values - data["start"].values[window])) + 1
+        name, start = (data[key].values[window] for key in ("run", "start"))
+        run = result.prepared[name]
+        at = nearest_sample(run["time"].values, start, name) + 1
         part = slice(at, at + data.sizes["time"])
         return {
             "measured": packed(data["measured"].values[window]),

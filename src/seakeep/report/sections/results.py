@@ -495,7 +495,7 @@ def age(result: StudyResult) -> Section:
             BAND_WORDS[at["band"].item()],
             model_words(at["model"].item()),
             number(at["error_mean"].mean()),
-            ratio_of(at).change(),
+            ratio_of(at).growth(),
         )
         for at in entries(trend, "test", "band", "model")
     ]
