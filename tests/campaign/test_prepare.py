@@ -227,7 +227,7 @@ def test_still_water_has_no_period(tank):
     with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
         campaign.encounter_period()
     # A constant channel is kept all the same: whether it serves is the model's business.
-    assert campaign.prepare()["first"]["eta_fwd"].std() == 0.0
+    assert campaign.prepare(["first"])["first"]["eta_fwd"].std() == 0.0
 
 
 def gapped(columns):

@@ -16,7 +16,9 @@ def test_each_file_is_parsed_once_in_a_preparation(tmp_path, monkeypatch):
     monkeypatch.setattr(pd, "read_csv", lambda *a, **k: parsed.append(1) or read_csv(*a, **k))
     t = 0.1 * np.arange(400)
     for name in "ab":
-        table = pd.DataFrame({"t [s]": t, "eta_1 [m]": np.sin(t), "heave [m]": np.cos(t)})
+        table = pd.DataFrame(
+            {"t [s]": t, "eta_1 [m]": np.sin(t + ord(name)), "heave [m]": np.cos(t)}
+        )
         table.to_csv(tmp_path / f"{name}.csv", index=False)
     runs = "".join(f"[runs.{name}]\nfile = '{name}.csv'\n" for name in "ab")
     (tmp_path / "campaign.toml").write_text(

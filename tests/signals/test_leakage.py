@@ -52,6 +52,16 @@ def test_a_few_waves_are_alike_in_any_two_seas():
     assert leak([sea(1)], sea(1)[1000 : 1000 + 32 * 25]) is not None
 
 
+def test_a_loop_of_forty_seconds_within_a_test():
+    """25 periods of 210 s; 20 of them are a stretch."""
+    record, count = sea(1, jitter=1.0), round(40 / DT)
+    record[1000 : 1000 + count] = sea(0)[2000 : 2000 + count]
+    found = leak([sea(0)], record)
+    assert found is not None
+    assert found.training_start - found.test_start == pytest.approx(1000 * DT, abs=DT)
+    assert 0.1 < found.share < 0.25
+
+
 def test_regular_waves_repeat_by_their_nature():
     wave = 0.05 * np.sin(3.0 * TIME) * (1 + 0.04 * np.sin(0.3 * TIME))
     assert leak([wave[:HALF]], wave[HALF:]) is None

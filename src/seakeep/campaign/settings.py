@@ -39,7 +39,7 @@ class GeneralSettings(Table):
     description: str = optional("free text", "")
     scale_factor: Positive = optional("full-scale length over model length, such as 30.0", 1.0)
     encounter_period: Positive | None = optional(
-        "mean encounter period in seconds; left out, it is measured"
+        "mean encounter period in seconds; left out, it is measured, in test runs too"
     )
     period_channel: str | None = optional(
         "the wave channel whose zero-up-crossings define the encounter period"

@@ -32,7 +32,7 @@ def read_matlab(path: Path, options: Options) -> Columns:
     """
     content = _unwrapped({k: v for k, v in _loaded(path).items() if not k.startswith(("__", "#"))})
     units = _units(content)
-    vectors = _named_matrix(path, content) or _vectors(path, content)
+    vectors = _channels(path, content)
     sizes = [vector.size for vector in vectors.values()]
     clock = next((name for name in (options.time, *_TIMES) if name in vectors), None)
     length = vectors[clock].size if clock else max(sizes, key=sizes.count)
@@ -57,7 +57,7 @@ def read_matlab(path: Path, options: Options) -> Columns:
             )
     return Columns(
         values={name: vector for name, vector in values.items() if name not in faults},
-        units={name: unit for name, unit in units.items() if name in values},
+        units=units,
         faults={name: f"{path}: {words}" for name, words in faults.items()},
         headers=dict(zip(names, vectors, strict=True)),
         sampling_rate=_rate(content),
@@ -165,53 +165,32 @@ def _units(content: Mapping[str, Any]) -> dict[str, str]:
     return dict(zip(names, listed, strict=True)) if len(names) == len(listed) else {}
 
 
-def _named_matrix(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
-    """Columns of a matrix beside which their names stand; empty if there is none."""
-    names = _texts(content, _NAME_KEYS)
-    if not names:
-        return {}
+def _channels(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Vectors of a file, and the columns of a matrix beside which their names stand."""
+    arrays = {key: np.asarray(value) for key, value in content.items()}
     arrays = {
-        k: v for k, v in content.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"
+        k: a.astype(float) for k, a in arrays.items() if a.dtype.kind in "fiub" and a.size > 1
     }
+    vectors = {key: array for key, array in arrays.items() if array.ndim == 1}
+    names = _texts(content, _NAME_KEYS)
+    if vectors and not names:
+        return vectors
     matrices = {key: array for key, array in arrays.items() if array.ndim == 2}
     for key, matrix in matrices.items():
         rows, columns = matrix.shape
-        if columns == len(names):
-            beside = {k: v.astype(float) for k, v in arrays.items() if v.ndim == 1}
-            return {**beside, **{n: matrix[:, i].astype(float) for i, n in enumerate(names)}}
-        if rows == len(names):
-            raise _transposed(path, key, matrix.shape)
-    shapes = ", ".join(f"{key} {value.shape}" for key, value in matrices.items()) or "none"
-    raise DataError(
-        f"{path} lists {len(names)} channel names, and no matrix has as many columns (matrices: "
-        f"{shapes}). A matrix is (time, channel), one name per column."
-    )
-
-
-def _transposed(path: Path, key: str, shape: tuple[int, ...]) -> DataError:
-    return DataError(
-        f"{path}: '{key}' has shape {shape}, which looks transposed; expected (time, channel) = "
-        f"({shape[1]}, {shape[0]}). Save it transposed: nothing is turned silently."
-    )
-
-
-def _vectors(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
-    vectors, matrices = {}, {}
-    for name, value in content.items():
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiub" or array.ndim > 2 or array.size < 2:
-            continue
-        if array.ndim == 1:
-            vectors[name] = array.astype(float)
-        else:
-            matrices[name] = array
-    if vectors:
-        return vectors
-    for name, matrix in matrices.items():
-        if matrix.shape[0] < matrix.shape[1]:
-            raise _transposed(path, name, matrix.shape)
+        if names and columns == len(names):
+            return vectors | dict(zip(names, matrix.T.copy(), strict=True))
+        if rows == len(names) or (not names and rows < columns):
+            raise DataError(
+                f"{path}: '{key}' has shape {matrix.shape}, which looks transposed; expected "
+                f"(time, channel) = ({columns}, {rows}). Save it transposed: nothing is turned "
+                "silently."
+            )
+    if names or matrices:
+        shapes = ", ".join(f"{key} {value.shape}" for key, value in matrices.items()) or "none"
         raise DataError(
-            f"{path}: the matrix '{name}' {matrix.shape} has no names for its columns. Save a cell "
-            "array 'names' beside it, or one vector per channel."
+            f"{path} lists {len(names)} channel names, and no matrix has as many columns "
+            f"(matrices: {shapes}). A matrix is (time, channel), beside a cell array 'names' with "
+            "one name per column."
         )
     raise DataError(f"{path} holds no channels; found {', '.join(content) or 'nothing'}. {_SAVE}")

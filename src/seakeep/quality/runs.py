@@ -125,13 +125,12 @@ def shared_files(runs: Datasets) -> Findings:
     """Runs that use the same part of files that have the same content."""
     for (name, first), (other, second) in combinations(runs.items(), 2):
         both = (first.attrs, second.attrs)
-        files = [set(str(each.get("file_sha256", "")).split()) for each in both]
+        files = [set(each.get("file_sha256", "").split()) for each in both]
         uses = [(*each.get("train_span", ()), *each.get("test_span", ())) for each in both]
         begin = max(min(use, default=np.inf) for use in uses)
         end = min(max(use, default=-np.inf) for use in uses)
         if begin < end and files[0] & files[1]:
-            details = {"other": name}
-            yield Finding(RunsKind.FILE, other, "file", end, None, "s", begin, details)
+            yield Finding(RunsKind.FILE, other, "file", end, None, "s", begin, {"other": name})
 
 
 def judge_runs(runs: Datasets) -> list[str]:
