@@ -588,9 +588,7 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     for unit, keys in ATTRIBUTES.items():
         by, _ = factor_of(unit)
         for key in keys & run.attrs.keys():
-            value = run.attrs[key]
-            pair = isinstance(value, tuple | list)
-            out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+            out.attrs[key] = _times(by, run.attrs[key])
     if "outside_training" in run.attrs:
         out.attrs["outside_training"] = f"at model scale: {run.attrs['outside_training']}"
     if "status" in run.attrs:  # it names instants, and so does that of each member
@@ -604,6 +602,12 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
             ]
             out["status"] = out["status"].copy(data=words)
     return out
+
+
+def _times(factor: float, value: Any) -> Any:
+    """A number, or a pair of them, times a factor."""
+    is_pair = isinstance(value, tuple | list)
+    return tuple(factor * float(v) for v in value) if is_pair else factor * float(value)
 
 
 def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> xr.Dataset:
