@@ -246,3 +246,16 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     kept.write_text("[]")
     with pytest.raises(RequestError, match="keeps no scores of a search"):
         search(runs(), **more)
+
+
+def test_a_search_reads_nothing_after_the_stop():
+    poisoned = runs(2)
+    for run in poisoned.values():
+        for channel in (*STATES, *INPUTS):
+            run[channel].values[601:] = np.nan
+    options = {"vary": ["observables", "lead"], "horizon": (15,), "stop": 60.0}
+    one, other = (
+        seakeep.tune(SPEC, each, STATES, INPUTS, **options).table for each in (runs(2), poisoned)
+    )
+    assert one.identical(other)
+    assert np.isfinite(one["score"]).all()

@@ -1,4 +1,4 @@
-"""The model against outside packages: pykoop, scikit-learn, python-control, scipy, plain numpy."""
+"""The model against outside packages: pykoop, scipy, plain numpy."""
 
 import numpy as np
 import pytest
@@ -73,24 +73,6 @@ def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
     )
     forecast = model.forecast(other, start=float(other.time[first - 1]), steps=160 - first)
     assert_allclose(table(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST)
-
-
-@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-@pytest.mark.parametrize(("samples", "ridge"), [(60, 0.5), (400, 0.5), (400, 20.0)])
-def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge):
-    linear_model = pytest.importorskip("sklearn.linear_model")
-    s, z = 5, 20
-    run = make_run(samples=samples)
-    model = fit(run, s, z, ridge=ridge, delay_rows=delay_rows)
-    x, u = table(run, STATES), table(run, INPUTS)
-    rows = [
-        np.concatenate([x[j - s : j + 1][::-1].ravel(), u[j - z : j + 1][::-1].ravel()])
-        for j in range(z, samples - 1)
-    ]
-    oracle = linear_model.Ridge(alpha=ridge, fit_intercept=False, solver="cholesky")
-    oracle.fit(np.array(rows), x[z + 1 :])
-    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
-    assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
 
 
 @pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3), (5, 0), (3, 1)])

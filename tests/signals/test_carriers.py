@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from seas import sea
 
 from seakeep.core.recursion import carried
@@ -42,17 +42,6 @@ def test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design(
         assert errors[column] < 0.12
     # At the probe itself, within what was read, the wave is the sample.
     assert errors[1] < 0.02
-
-
-def test_a_carrier_reads_its_own_samples_alone(spectrum):
-    taps, _ = designed(spectrum, (0.3,))
-    record = np.random.default_rng(0).standard_normal((400, 2))
-    expected = carried(taps, record)
-    row = 100  # belongs to sample row + BACK
-    record[:row] = record[row + BACK + AHEAD + 1 :] = 1e9
-    assert_array_equal(carried(taps, record)[row], expected[row])
-    record[row + BACK + AHEAD] += 1.0
-    assert carried(taps, record)[row, 0] - expected[row, 0] == pytest.approx(taps[0, :, -1].sum())
 
 
 def test_the_position_follows_a_slow_oscillation_and_holds_at_rest():

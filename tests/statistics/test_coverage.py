@@ -28,15 +28,6 @@ def test_each_channel_and_window_is_judged_alone():
     assert found.relative_width == pytest.approx(expected, rel=1e-12)
 
 
-def test_an_infinite_margin_holds_everything():
-    measured = np.array([[0.0, 0.0], [1.0, 5.0], [2.0, 0.0]])
-    lower, upper = np.full((3, 2), [-np.inf, -1.0]), np.full((3, 2), [np.inf, 1.0])
-    found = coverage(lower, upper, measured)
-    assert found.inside.tolist() == [1.0, pytest.approx(2 / 3, rel=1e-15)]  # two roundings
-    assert found.width.tolist() == [np.inf, 2.0]
-    assert found.relative_width[0] == np.inf
-
-
 def test_a_band_with_gaps_and_a_constant_measurement_give_nan():
     measured = np.stack([np.arange(4.0), np.ones(4)], axis=1)
     lower = measured - 1

@@ -1,10 +1,10 @@
-"""Waves carried to the vessel by measured or predicted surge; two test sets, one regular."""
+"""Waves carried to the vessel by predicted surge; two test sets, one regular."""
 
 import numpy as np
 import pytest
 from seas import Sea
 from small_tank import write_csv
-from tutorial_study import assert_cells_are_what_the_models_say, edit
+from tutorial_study import assert_cells_are_what_the_models_say
 
 from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
@@ -92,29 +92,17 @@ def write_run(path, seed, seconds, frequencies, grows=0.0):
     write_csv(path, {"t [s]": time, "eta [m]": eta, "x [m]": surge + noise[0], "z [m]": heave})
 
 
-@pytest.fixture
-def folder(tmp_path):
+def test_cells_and_statistics_of_both_sets_are_what_the_models_say(tmp_path):
     write_run(tmp_path / "sea.csv", 2, 110, np.random.default_rng(2).uniform(0.4, 0.9, 12))
     write_run(tmp_path / "wave.csv", 3, 40, [0.6], grows=10.0)
     (tmp_path / "campaign.toml").write_text(CAMPAIGN, "utf-8")
     (tmp_path / "study.toml").write_text(STUDY, "utf-8")
-    return tmp_path
-
-
-def test_cells_by_predicted_surge_are_what_the_models_say(folder):
-    study = read_study(folder / "study.toml")
-    found = run_study(study, folder / "out")
+    study = read_study(tmp_path / "study.toml")
+    found = run_study(study, tmp_path / "out")
     assert found.conditional_on == {}
-    plan = make_plan(study)
-    assert {test: len(each) for test, each in plan.tests.items()} == {"later": 2, "regular": 3}
     # The record is read up to the end of the last window of its run, and continued by prediction
     # from there: alone, a window ends with less of it.
-    assert_cells_are_what_the_models_say(found, plan, rtol=0, atol=3e-6)
-
-
-def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):
-    path = edit(folder / "study.toml", ('"predicted"', '"none"'))
-    found = run_study(read_study(path), folder / "out")
+    assert_cells_are_what_the_models_say(found, make_plan(study), rtol=0, atol=3e-6)
     for test, windows, seconds in (("later", 2, 12.8), ("regular", 3, 8.0)):
         assert found.tests[test].sizes["window"] == windows
         assert found.tests[test]["time"][-1] == pytest.approx(seconds)
