@@ -591,17 +591,22 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
             out.attrs[key] = _times(by, run.attrs[key])
     if "outside_training" in run.attrs:
         out.attrs["outside_training"] = f"at model scale: {run.attrs['outside_training']}"
-    if "status" in run.attrs:  # it names instants, and so does that of each member
-        dt = float(np.diff(out["time"].values[:2]).sum())
-        out.attrs["status"] = status_text(out.attrs, dt)
-        if "status" in out:
-            shared = {key: out.attrs[key] for key in out.attrs.keys() & {"input_predicted_from"}}
-            words = [
-                status_text(shared if np.isnan(at) else shared | {"diverged_at": at}, dt)
-                for at in out["diverged_at"].values
-            ]
-            out["status"] = out["status"].copy(data=words)
+    if "status" in run.attrs:
+        _say_status_anew(out)
     return out
+
+
+def _say_status_anew(forecast: xr.Dataset) -> None:
+    """State the instants of a status, and of that of each member, as they are now."""
+    attrs, dt = forecast.attrs, float(np.diff(forecast["time"].values[:2]).sum())
+    attrs["status"] = status_text(attrs, dt)
+    if "status" in forecast:
+        shared = {key: attrs[key] for key in attrs.keys() & {"input_predicted_from"}}
+        words = [
+            status_text(shared if np.isnan(at) else shared | {"diverged_at": at}, dt)
+            for at in forecast["diverged_at"].values
+        ]
+        forecast["status"] = forecast["status"].copy(data=words)
 
 
 def _times(factor: float, value: Any) -> Any:
