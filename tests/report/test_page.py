@@ -13,6 +13,7 @@ from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
 from seakeep.report.sections.results import (
+    _tested,
     bands,
     coverage_table,
     divergence_table,
@@ -249,3 +250,16 @@ def test_lost_forecasts_are_named(result):
     judged = replace(result, groups={**result.groups, "statistics/lost": lost})
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
+
+
+def test_training_sets_that_no_window_judges_are_not_counted(result):
+    assert "from 2 training sets and run freely" in _tested(result)
+    judged = result.tests["unseen"]["judged"] & (result.tests["unseen"]["training"] == "t01")
+    one = {"tests/unseen": result.tests["unseen"].assign(judged=judged)}
+    assert "from 1 training set and run freely" in _tested(changed(result, one))
+    more = changed(
+        result,
+        {**one, "tests/again": result.tests["unseen"]},
+        tests={"unseen": {"label": "first"}, "again": {"label": "again"}},
+    )
+    assert re.search(r"from 2 training sets .*T̂, models of 1 set\), again \(3", _tested(more))
