@@ -29,6 +29,7 @@ pytest.importorskip("matplotlib")
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
+from seakeep.report.sections.histories import histories
 
 CHANNELS = 'states = ["heave", "pitch", "heave_rate"]\ninputs = ["eta_fwd", "eta_mid"]'
 NAMED = STUDY.replace("seed = 3", CHANNELS).replace("length = 6", 'length = 6\nlabel = "a & b < c"')
@@ -263,3 +264,14 @@ def test_training_sets_that_no_window_judges_are_not_counted(result):
         tests={"unseen": {"label": "first"}, "again": {"label": "again"}},
     )
     assert re.search(r"from 2 training sets .*T̂, models of 1 set\), again \(3", _tested(more))
+
+
+def test_captions_name_an_ensemble_where_there_is_one_and_hold_no_mark_up(page, result):
+    single = replace(result, attrs={**result.attrs, "models": json.dumps(
+        {name: {**of, "ensemble": False} for name, of in result.model_settings.items()}
+    )})  # fmt: skip
+    for each, has_band in ((result, True), (single, False)):
+        captions = [figure.caption for figure in histories(each).figures]
+        assert captions
+        assert ["ensemble" in caption for caption in captions] == [has_band] * len(captions)
+    assert "`" not in re.sub("(?s)<script.*?</script>", "", page.read_text("utf-8"))
