@@ -210,6 +210,29 @@ def test_errors_that_models_share_cancel_in_their_difference():
         assert_allclose(found[f"all_{key}"], [0, -0.5, 0], atol=1e-12)
 
 
+def test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it():
+    rng = np.random.default_rng(0)
+    *measured, white = (labelled(rng.normal(size=(400, 2))) for _ in range(3))
+    slow = np.sin(2 * np.pi * np.arange(400) / 100)[:, None] * np.ones(2)
+    near = [m + 0.1 * white for m in measured]
+    far = [m + labelled(slow) for m in measured]  # whose blocks are longer
+    found = metrics.anrmse_differences([near, far], measured)
+    for k, of in enumerate((near, far)):
+        own = [
+            metrics.anrmse(predicted=p, measured=m, interval=0.95)
+            for p, m in zip(of, measured, strict=True)
+        ]
+        assert_array_equal(np.stack([found["anrmse_lower"][k], found["anrmse_upper"][k]], 1), own)
+    one = metrics.anrmse_differences([near[1:], far[1:]], measured[1:])
+    for key in ("anrmse_lower", "anrmse_upper"):
+        assert_array_equal(one[f"all_{key}"], found[key][:, 1])
+    # Two records of as many blocks, each with draws of its own: narrower by √2.
+    widths = [
+        np.log(found[f"{k}_upper"] / found[f"{k}_lower"])[0] for k in ("anrmse", "all_anrmse")
+    ]
+    assert widths[1] / widths[0].mean() == pytest.approx(0.5**0.5, abs=0.1)
+
+
 def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
     measured = np.tile([[1.0, 1.0], [-1.0, -1.0]], (50, 1))
     spread = measured.std(axis=0, ddof=1)

@@ -25,6 +25,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction, undefined
@@ -219,9 +220,9 @@ def anrmse_differences(
         Over (model, run): ``anrmse``, ``change`` (relative to the first model, −0.2 for 20 %
         less) and its bounds ``lower`` and ``upper``; also ``anrmse_lower`` and ``anrmse_upper``.
         The same over ``model`` for the mean over the runs, as ``all_anrmse``, ``all_change`` and
-        so on. All models are redrawn in the same
-        blocks of instants, so that errors that they share cancel. The bounds hold for these runs:
-        they do not contain the spread between runs.
+        so on. For a change both models are redrawn in the same blocks of instants, so that errors
+        that they share cancel; the bounds of an ANRMSE are those of :func:`anrmse`, with blocks
+        of its model. The bounds hold for these runs: they do not contain the spread between runs.
 
     Raises
     ------
@@ -239,21 +240,24 @@ def anrmse_differences(
     True
     """
     level = fraction(interval, "interval")
-    runs, draws, blocks = [], [], 0.0
+    draws, values, blocks = [], [], []  # per run; of each model with its own blocks, and paired
     for seed, (truth, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
         pairs = [_paired(each, truth) for each in forecasts]
         cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in pairs]
-        block = max(_block(p, m) for p, m, _ in cases)
-        own = np.array([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases])
-        redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
-        redrawn = np.where(np.isnan(own)[:, None], np.nan, redrawn)
-        block_count = cases[0][1].shape[-2] / block
-        runs.append(_with_bounds(own, redrawn, block_count, level))
-        draws.append(redrawn)
-        blocks += block_count
+        own = [_block(p, m) for p, m, _ in cases]
+        values.append([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases])
+        alone = [_redrawn(core.anrmse, *case, n) for case, n in zip(cases, own, strict=True)]
+        shared = [_redrawn(core.anrmse, *case, max(own), seed) for case in cases]
+        lost = np.isnan(values[-1])[:, None]
+        draws.append(np.where(lost, np.nan, [alone, shared]))
+        blocks.append(cases[0][1].shape[-2] / np.array([own, [max(own)] * len(own)]))
+    runs = [_with_bounds(*each, level) for each in zip(values, draws, blocks, strict=True)]
     over_runs = {key: np.stack([run[key] for run in runs], axis=-1) for key in runs[0]}
-    means = over_runs["anrmse"].mean(axis=-1)
-    pooled = _with_bounds(means, np.mean(draws, axis=0), blocks, level)
+    # The same draws of another run, in another order.
+    others = [[np.roll(of[0], k, axis=-1), of[1]] for k, of in enumerate(draws)]
+    pooled = _with_bounds(
+        np.mean(values, axis=0), np.mean(others, axis=0), np.sum(blocks, axis=0), level
+    )
     return xr.Dataset(
         {key: (("model", "run"), values) for key, values in over_runs.items()}
         | {f"all_{key}": (("model",), values) for key, values in pooled.items()},
@@ -262,16 +266,22 @@ def anrmse_differences(
 
 
 def _with_bounds(
-    anrmse: FloatArray, redrawn: FloatArray, blocks: float, level: float
+    anrmse: npt.ArrayLike, redrawn: FloatArray, blocks: FloatArray, level: float
 ) -> dict[str, FloatArray]:
-    """ANRMSE of each model, its change from the first model, and the bounds of both."""
-    lower, upper = student_interval(anrmse, redrawn, blocks, level, -1)
-    change = (_ratio(anrmse), *student_interval(_ratio(anrmse), _ratio(redrawn), blocks, level, -1))
+    """ANRMSE of each model, its change from the first model, and the bounds of both.
+
+    `redrawn` and `blocks` are those of each model alone, and those that all models share.
+    """
+    values, (alone, shared) = np.asarray(anrmse), redrawn
+    each = zip(values, alone, blocks[0], strict=True)
+    own = np.array([student_interval(*one, level, -1) for one in each])
+    changes = student_interval(_ratio(values), _ratio(shared), blocks[1][0], level, -1)
     return {
-        "anrmse": anrmse,
-        "anrmse_lower": lower,
-        "anrmse_upper": upper,
-        **{key: each - 1.0 for key, each in zip(("change", *BOUNDS), change, strict=True)},
+        "anrmse": values,
+        "anrmse_lower": own[:, 0],
+        "anrmse_upper": own[:, 1],
+        "change": _ratio(values) - 1.0,
+        **{key: bound - 1.0 for key, bound in zip(BOUNDS, changes, strict=True)},
     }
 
 

@@ -206,6 +206,11 @@ def test_what_a_forecast_refuses(model, run, start, steps, message):
     assert model.forecast(run, start=0.4, steps=5).sizes["time"] == 5
 
 
+def test_a_run_shorter_than_the_history_has_no_later_start(model, run):
+    with pytest.raises(RequestError, match=r"needs 9 .*The run ends at 0\.35 s: give a longer one"):
+        model.forecast(run.isel(time=slice(0, 8)), 0.25, 1)
+
+
 @pytest.mark.parametrize(
     ("message", "settings"),
     {

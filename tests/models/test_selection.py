@@ -174,6 +174,23 @@ def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all():
     assert "no window of 150 samples can be held out of runs of at most 200" in fallen.note
 
 
+@pytest.mark.parametrize("history", ["before", "inside"])
+def test_the_parts_of_a_single_run_are_those_of_its_training_window(history):
+    run = runs(1)["run0"]
+    window, reach = 900, max(SPEC.state_delays, SPEC.input_delays)
+    read = window if history == "inside" else window + reach
+    spec = replace(SPEC, observables=(), history=history)
+    late = {"run": run.isel(time=slice(-read, None))}
+    of_window, of_late = (
+        select(each, given, STATES, INPUTS, horizon=(10.0,))
+        for each, given in ((replace(spec, window=window), {"run": run}), (spec, late))
+    )
+    assert "3 parts held out in turn" in of_window.note
+    assert of_window.settings.window == window
+    scores = [[row["score"] for row in each.rows] for each in (of_window, of_late)]
+    np.testing.assert_allclose(*scores, rtol=1e-9)
+
+
 def growing(seed):
     """A motion that grows by half a per cent a step: the truth has no stable model."""
     eta = np.random.default_rng(seed).standard_normal(120)

@@ -206,8 +206,13 @@ def test_a_lead_time_as_long_as_the_forecast_is_a_bound(lead_time, words):
         | {"lead_time": ("channel", [lead_time])},
         {"lead": [1.0, 2.0], "channel": ["heave"]},
     )
-    (table,) = nowcast_blocks({"m": made.expand_dims(run=["r"]).assign_attrs(facts)})
+    results = {"m": made.expand_dims(run=["r"]).assign_attrs(facts)}
+    (table,) = nowcast_blocks(results)
     assert table.rows[0][:2] == ("heave", words)
+    pytest.importorskip("matplotlib")
+    from seakeep.report.figures.errors import nowcast_figure
+
+    assert nowcast_figure(results, "r").get_suptitle() == "r"
 
 
 def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):

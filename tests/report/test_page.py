@@ -13,6 +13,7 @@ from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
 from seakeep.report.sections.results import (
+    _tested,
     bands,
     coverage_table,
     divergence_table,
@@ -28,6 +29,7 @@ pytest.importorskip("matplotlib")
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
+from seakeep.report.sections.histories import histories
 
 CHANNELS = 'states = ["heave", "pitch", "heave_rate"]\ninputs = ["eta_fwd", "eta_mid"]'
 NAMED = STUDY.replace("seed = 3", CHANNELS).replace("length = 6", 'length = 6\nlabel = "a & b < c"')
@@ -249,3 +251,27 @@ def test_lost_forecasts_are_named(result):
     judged = replace(result, groups={**result.groups, "statistics/lost": lost})
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
+
+
+def test_training_sets_that_no_window_judges_are_not_counted(result):
+    assert "from 2 training sets and run freely" in _tested(result)
+    judged = result.tests["unseen"]["judged"] & (result.tests["unseen"]["training"] == "t01")
+    one = {"tests/unseen": result.tests["unseen"].assign(judged=judged)}
+    assert "from 1 training set and run freely" in _tested(changed(result, one))
+    more = changed(
+        result,
+        {**one, "tests/again": result.tests["unseen"]},
+        tests={"unseen": {"label": "first"}, "again": {"label": "again"}},
+    )
+    assert re.search(r"from 2 training sets .*T̂, models of 1 set\), again \(3", _tested(more))
+
+
+def test_captions_name_an_ensemble_where_there_is_one_and_hold_no_mark_up(page, result):
+    single = replace(result, attrs={**result.attrs, "models": json.dumps(
+        {name: {**of, "ensemble": False} for name, of in result.model_settings.items()}
+    )})  # fmt: skip
+    for each, has_band in ((result, True), (single, False)):
+        captions = [figure.caption for figure in histories(each).figures]
+        assert captions
+        assert ["ensemble" in caption for caption in captions] == [has_band] * len(captions)
+    assert "`" not in re.sub("(?s)<script.*?</script>", "", page.read_text("utf-8"))

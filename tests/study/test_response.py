@@ -38,6 +38,17 @@ def test_the_parts_are_what_the_forecast_was_made_of():
     assert found["error_rest"] < 1e-6
 
 
+def test_the_phase_is_the_circular_mean_over_cells():
+    made = groups()
+    leads = np.radians([170.0, -160.0, -160.0])[:, None]  # the last of them past half a turn
+    turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
+    made["tests/t"]["mean"][:] = np.cos(turn + leads)[..., None]
+    found = regular_response(made, "t")["phase_lead"].sel(model="m", channel="surge")
+    mean = np.exp(1j * leads).mean()
+    assert found == pytest.approx(np.degrees(np.angle(mean)), abs=1e-6)
+    assert found.attrs["units"] == "deg"
+
+
 def test_the_squares_add_up_to_that_of_the_error():
     made = groups()
     rng = np.random.default_rng(0)

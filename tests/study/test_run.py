@@ -139,6 +139,18 @@ def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folde
         make_plan(read_study(path))
 
 
+def test_models_that_no_window_judges_are_named(study_folder):
+    path = study_folder / "study.toml"
+    scheme = 'scheme = "leave_out"\nleave_out = "run"\nruns = ["first", "second", "unseen"]'
+    text = '[study]\ncampaign = "campaign.toml"\n[training]\n{}\n[tests.all]\nwindows = {}\n'
+    path.write_text(text.format(scheme, 3), "utf-8")
+    assert len({window.run for window in make_plan(read_study(path)).windows}) == 3
+    path.write_text(text.format(scheme, 2), "utf-8")
+    with pytest.warns(SeakeepWarning, match=r"for the training sets without \w+, whose.*least 3"):
+        plan = make_plan(read_study(path))
+    assert len({window.run for window in plan.windows}) == 2
+
+
 def test_joined_series_are_the_windows_end_to_end(finished):
     test = finished.tests["unseen"]
     predicted, measured, diverged = joined(test, "bayesian")

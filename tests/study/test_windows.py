@@ -45,10 +45,18 @@ def left_out(found):
     return [each.left_out for each in found]
 
 
-def windows_of(runs=RUNS, name="set", steps=50, **table):
+def windows_of(runs=RUNS, name="set", steps=50, sets=(), **table):
     chosen = settings(tests={name: table}).tests[name]
     return choose_tests(
-        name, chosen, runs, list(runs), steps=steps, needs=NEEDS, whole=False, seed=5
+        name,
+        chosen,
+        runs,
+        list(runs),
+        steps=steps,
+        needs=NEEDS,
+        whole=False,
+        seed=5,
+        training=sets,
     )
 
 
@@ -113,6 +121,20 @@ def test_the_start_up_of_a_test_span_is_cut_off():
     assert min(w.start for w in without) == pytest.approx(NEEDS.history * DT)
     with pytest.raises(RequestError, match=r"tests.set: no window is feasible.*start-up"):
         windows_of(wave, startup=66.0)
+
+
+def test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay():
+    runs = {name: recorded(3000, sea_state="A") for name in ("a1", "a2", "a3")}
+    runs["b"] = recorded(150, sea_state="B")  # 2 % of all places
+    sets = training(runs=runs, scheme="leave_out", leave_out="sea_state")
+    drawn = windows_of(runs, sets=sets, windows=2)
+    assert [each.run[0] for each in drawn] == ["a", "b"]
+    assert {each.run for each in windows_of(runs, windows=4)} == set(runs)  # run by run
+    # Of places in random order the first of each group goes first: more windows move none.
+    more = windows_of(runs, sets=sets, windows=12)
+    assert {*drawn} < {*more}
+    many = windows_of(runs, sets=sets, windows=400)
+    assert many == windows_of(runs, sets=(), windows=400)
 
 
 def test_a_further_test_set_moves_no_window_of_another():

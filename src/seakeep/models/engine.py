@@ -385,10 +385,14 @@ class _Opened:
         if at + 1 < needed:
             near = abs(float(start) - time[at]) <= 1e-6 * dt
             snapped = "" if near else f" (nearest sample {shown(time[at])} s)"
+            remedy = f"Start at {shown(time[0] + (needed - 1) * dt)} s or later."
+            if time.size < needed:
+                end = shown(time[-1])
+                remedy = f"The run ends at {end} s: give a longer one, or fit with fewer delays."
             raise RequestError(
                 f"start = {shown(float(start))} s{snapped} leaves {at + 1} samples of history in "
                 f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
-                f"missing. Start at {shown(time[0] + (needed - 1) * dt)} s or later."
+                f"missing. {remedy}"
             )
         available = time.size - 1 - at
         # The last input needed is the one an instant before the last state, and the lead after it.

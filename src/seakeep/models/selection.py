@@ -393,6 +393,7 @@ class Problem:
         """The same of a candidate that is fitted for itself."""
         own, names = self.data.signature, self.data.names
         given = {names[other]: self.runs[names[other]] for other in others}
+        candidate = replace(candidate, window=self.widest.window)
         model, judged = candidate.fit(given, own.states, own.inputs), self.runs[names[run]]
         begin = round((self.data.begin(run) - float(judged["time"][0])) / own.dt)
         for steps in horizons:
@@ -426,7 +427,8 @@ def _problem(
 ) -> Problem | None:
     """The columns of all candidates, which the widest holds; None where the runs are too short.
 
-    `folds` holds the group of each run, or the number of parts that runs are split into.
+    `folds` holds the group of each run, or the number of parts that the training window of each is
+    split into.
     """
     widest = replace(widest, ridge=1.0, standardize=True)
     runs, states, inputs = given
@@ -436,11 +438,15 @@ def _problem(
     pieces = dict(runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
         pieces = {}
+        inside = before if widest.history == "inside" else 0
         for name, run in runs.items():
-            edges = np.linspace(before, run.sizes["time"] - after, folds + 1).astype(int)
+            size = run.sizes["time"]
+            begin = before if widest.window is None else max(before, size - widest.window + inside)
+            edges = np.linspace(begin, size - after, folds + 1).astype(int)
             for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
                 samples = slice(max(first - before, 0), stop + after)
                 pieces[f"{name}, part {number}"] = run.isel(time=samples)
+        widest = replace(widest, window=None)  # all of the parts, which share it
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
     known = None if isinstance(folds, int) else chain
@@ -1045,9 +1051,6 @@ def readouts_for(
             "zero. Raise ridge, or write 'wave'."
         )
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
-    if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
-        runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
-        settings = replace(settings, window=None)
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
     given = runs, states, inputs
     problem = _problem(settings, given, apart, (ridge,), (steps,))

@@ -526,8 +526,8 @@ def regular_response(groups: Datasets, test: str) -> xr.Dataset:
     """Take the error of a test set in regular waves apart.
 
     ``error_offset``, ``error_wave`` and ``error_rest`` are root mean squares over cells in measured
-    SDs, whose squares add up to that of the NRMSE; ``phase_lead`` is that of the forecast before
-    the measurement, degrees.
+    SDs, whose squares add up to that of the NRMSE; ``amplitude_ratio`` is the median over cells,
+    and ``phase_lead`` (degrees) the circular mean of that of the forecast before the measurement.
     """
     data = groups[f"tests/{test}"]
     squares, answer = _responses(groups, test)
@@ -538,7 +538,10 @@ def regular_response(groups: Datasets, test: str) -> xr.Dataset:
         phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=(1, 2))))
         ratio = np.nanmedian(np.abs(answer), axis=(1, 2))
     coords = {"model": data["model"], "channel": data["channel"]}
-    return numbered([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
+    out = numbered([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
+    words = "phase of the forecast before the measurement, circular mean over cells"
+    out["phase_lead"].attrs.update(units="deg", long_name=words)
+    return out
 
 
 def _responses(groups: Datasets, test: str) -> tuple[FloatArray, ComplexArray]:

@@ -15,7 +15,7 @@ from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import load_prepared
 from seakeep.check.parts import whole_span
 from seakeep.conventions import is_elevation
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Needs, Spec
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
@@ -174,7 +174,7 @@ def choose_training(
     if training.scheme == "pooled":
         return (TrainingSet("pooled", tuple(whole.values())),)
     seed, remedy = settings.study.seed, "shorten the training length"
-    places = _places("training", training, spans, needed, needs.snapshots, seed, remedy)
+    places = _places("training", training, spans, needed, needs.snapshots, seed, remedy, {})
     return tuple(
         TrainingSet(f"t{number:02d}", (part(*place),)) for number, place in enumerate(places)
     )
@@ -188,8 +188,12 @@ def _places(
     width: int,
     seed: int,
     remedy: str,
+    shares: Mapping[str, str],
 ) -> list[tuple[str, int]]:
-    """Feasible last samples in random order; with 'apart' no two within `width` samples."""
+    """Feasible last samples in random order; with 'apart' no two within `width` samples.
+
+    The first one of each share goes before all others: a share is named by the runs that it holds.
+    """
     drawn = asked.placement == "random"
     step = 1 if drawn else max(width, 1)
     every = []
@@ -202,7 +206,11 @@ def _places(
             f"{table}.windows: {count} windows were asked for and {len(every)} are feasible. Ask "
             f"for fewer, or {remedy}."
         )
-    return [every[i] for i in random_stream(seed, table).permutation(len(every))[:count]]
+    places = [every[i] for i in random_stream(seed, table).permutation(len(every))]
+    firsts = dict[str, tuple[str, int]]()
+    for place in places if shares else ():
+        firsts.setdefault(shares[place[0]], place)
+    return list(dict.fromkeys([*firsts.values(), *places]))[:count]
 
 
 def choose_tests(
@@ -215,8 +223,13 @@ def choose_tests(
     needs: Needs,
     whole: bool,
     seed: int,
+    training: Sequence[TrainingSet] = (),
 ) -> tuple[TestWindow, ...]:
-    """Choose the windows of a test set."""
+    """Choose the windows of a test set.
+
+    Each group of runs that is left out together has one, and each other run, where there are as
+    many windows.
+    """
     spans = {}
     for each in names:
         run = runs[each]
@@ -235,7 +248,9 @@ def choose_tests(
             f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
             f"Reduce length or startup{at_most}, or give longer runs."
         )
-    places = _places(f"tests.{name}", test, spans, steps + 1, steps, seed, "reduce length")
+    shares = {run: run for run in names}
+    shares |= {run: each.name for each in training for run in each.left_out}
+    places = _places(f"tests.{name}", test, spans, steps + 1, steps, seed, "reduce length", shares)
     return tuple(
         TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
         for each, last in sorted(places, key=lambda place: (names.index(place[0]), place[1]))
@@ -390,6 +405,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
             needs=needs,
             whole=(test.part or ("whole" if left_out else "test")) == "whole",
             seed=general.seed,
+            training=training,
         )
         for name, test in settings.tests.items()
     }
@@ -400,6 +416,19 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
                     f"tests.{name}: no model may be tested on the run '{window.run}', because all "
                     "learn from it. Leave it out of training.runs, or name other runs."
                 )
+    asked = {run for names in testing.values() for run in names}
+    tested = {window.run for windows in tests.values() for window in windows}
+    untested = [
+        each.name
+        for each in training
+        if asked.intersection(each.left_out) and not any(map(each.may_test, tested))
+    ]
+    if untested:
+        warn(
+            f"tests: no window is left for the training sets {', '.join(untested)}, whose models "
+            f"are fitted and not judged. Ask for more windows, at least {len(training)} to test "
+            "all, or reduce length."
+        )
     return Plan(
         settings,
         study.states,

@@ -322,6 +322,7 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
         if axes.get_subplotspec().is_first_col():
             axes.set_ylabel("error [training SD]")
     legend_outside(places[0], side="upper right")
+    figure.suptitle(plain_text(run), x=0.01, ha="left")
     return figure
 
 

@@ -21,10 +21,10 @@ MISSING = 65535
 
 def histories(result: StudyResult) -> Section:
     """Return figures of the cells that are shown."""
-    words = {
-        "level": 100 * result.level,
-        "edges": ", and that band calibrated (dotted)" if result.is_calibrated else "",
-    }
+    calibrated = ", and that band calibrated (dotted)" * result.is_calibrated
+    level = f"{100 * result.level:g}"
+    bands = f"; of an ensemble its mean with its {level} % band{calibrated}"
+    words = {"bands": bands * bool(result.ensembles)}
     figures = []
     for cell in shown_cells(result):
         test, _, window = cell

@@ -92,12 +92,16 @@ def summary(result: StudyResult) -> Section:
 def _tested(result: StudyResult) -> str:
     """What was tested, in one sentence or two."""
     period = result.encounter_period
-    sets = result.groups["training"].sizes["training"]
-    seas = [
-        f"{result.label_of(test)} ({data.sizes['window']} windows of "
-        f"{data['time'].values[-1] / period:.3g} T̂)"
-        for test, data in result.tests.items()
-    ]
+    judged = {test: data["judged"].any("window") for test, data in result.tests.items()}
+    sets = int(np.any([*judged.values()], axis=0).sum())
+    seas = []
+    for test, data in result.tests.items():
+        used = int(judged[test].sum())
+        some = f", models of {used} set{'s' * (used > 1)}" if used < sets else ""
+        seas.append(
+            f"{result.label_of(test)} ({data.sizes['window']} windows of "
+            f"{data['time'].values[-1] / period:.3g} T̂{some})"
+        )
     return (
         f"Tested: {listed(result.models)}, each learnt from {sets} training "
         f"set{'s' * (sets > 1)} and run freely through {', '.join(seas)}; {len(result.channels)} "
