@@ -156,6 +156,23 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
 
 
 @pytest.mark.usefixtures("errors_of_training")
+def test_what_jumps_is_lost_as_in_the_live_model(library, model, make_run):
+    live, found = model.live(), Estimator(library, "exact")
+    every, jumped = make_run(COUNT, 5).to_dataframe(), []
+    u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
+    far = 1e3 * y.std(axis=0)
+    y[15], y[420], y[500:503] = y[15] + far, y[420] + far, y[500:503] + far
+    u[600, 0] += 1e3
+    for at in range(COUNT):
+        assert_allclose(*found.beside(live, u[at], y[at]), rtol=0, atol=1e-9)
+        jumped += [(at, each) for each in live.jumped]
+        if at in (419, 420, 435, 436, 502, 600):
+            assert found.validity & (Validity.CONSISTENCY | Validity.LOST) == live.validity
+    assert (420, STATES[0]) in jumped
+    assert {at for at, _ in jumped} >= {420, 500, 501, 502, 600}
+
+
+@pytest.mark.usefixtures("errors_of_training")
 def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     model, make_run, tmp_path
 ):

@@ -11,8 +11,9 @@ from records import record, table
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
 
+import seakeep.models.live
 from seakeep import HankelDMDc, Powers, RequestError, load_live
-from seakeep.models.live import LEAST_RECORD
+from seakeep.models.live import LEAST_RECORD, MOTIONS
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import foresee
@@ -252,8 +253,56 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     assert_allclose(std(made), expected, rtol=1e-12)
 
 
+@in_place_and_carried
+@pytest.mark.parametrize(
+    ("name", "flag"), [(INPUTS[1], Validity.LOST), ("heave", Validity.CONSISTENCY)]
+)
+def test_a_sample_that_jumps_is_lost_and_named(models, drift, tmp_path, key, name, flag):
+    spiked, lost = started(models[key], drift), started(models[key], drift)
+    assert spiked.validity == Validity(0)
+    spiked = load_live(models[key], spiked.save(tmp_path / "live.nc"))
+    far = drift[name].values[START] + 8 * drift[name].std()
+    for value, live in ((far, spiked), (np.nan, lost)):
+        other = drift.copy(deep=True)
+        other[name].values[START] = value
+        play(live, other, START, START + 1)
+    assert [spiked.jumped, lost.jumped] == [(name,), ()]
+    assert_array_equal(spiked.state, lost.state)
+    assert flag in spiked.validity
+    for live in (spiked, lost):
+        play(live, drift, START + 1, START + 60)
+    assert spiked.jumped == ()
+    assert_array_equal(mean(spiked.forecast(STEPS)), mean(lost.forecast(STEPS)))
+    assert spiked.validity == lost.validity == Validity(0)
+
+
+def test_a_load_may_jump_and_so_may_an_input_that_is_no_wave(models, drift):
+    units = [label.units for label in models["plain"].signature.state_labels]
+    live = models["plain"].live(roles={INPUTS[0]: "constant"})
+    least = live.equations["smoothest"]
+    assert_array_equal(np.isinf(least), [True, False, *(each not in MOTIONS for each in units)])
+    assert_allclose(4 * least[1], 0.01 * models["plain"].coverage.heights[1], rtol=1e-12)
+
+
+def test_filled_waves_drive_no_free_run(models, drift):
+    u, y = table(drift, INPUTS), table(drift, STATES)
+    live, gaps = models["plain"].live(), models["plain"].live()
+    for at in range(2 * START):
+        is_lost = at >= START and at % live.model.history_samples == 0
+        live.step(None if is_lost else u[at], y[at])
+        gaps.step(None if at > 4 and at % live.model.history_samples == 0 else u[at], y[at])
+        if at == START:
+            before = live.consistency_by_state[1]
+    assert np.all(before != 1)
+    assert np.isnan(gaps.consistency_by_state[1]).all()
+    # What is not judged is forgotten.
+    after = live.consistency_by_state[1]
+    assert np.all(np.abs(after - 1) < 0.3 * np.abs(before - 1))
+
+
 @pytest.mark.parametrize("value", [9.97e36, 1e200])
-def test_a_spike_is_forgotten_by_the_consistency(models, drift, value):
+def test_a_spike_is_forgotten_by_the_consistency(models, drift, value, monkeypatch):
+    monkeypatch.setattr(seakeep.models.live, "MOTIONS", ())
     live = started(models["plain"], drift)
     spoilt = drift.copy(deep=True)
     spoilt["heave"].values[START] = value

@@ -8,7 +8,10 @@ from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import (
+    FEWEST,
+    JUMP,
     Foreseen,
+    Jumps,
     close_gaps,
     fill_future,
     foresee,
@@ -29,6 +32,37 @@ def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
     error = np.abs(found - [3.0, -1.0] - expected[2:]).max(axis=0) / spread
     assert np.all(error < 0.25)
     assert np.all(np.abs(expected[2:]).max(axis=0) > 0.5 * spread)  # what there was to foresee
+
+
+def jumps_of(series, least=1e-3):
+    """Samples of one channel that jump."""
+    jumps = Jumps(np.array([least]))
+    return [at for at, value in enumerate(series) if jumps.of(np.array([value])).any()]
+
+
+def test_a_jump_is_far_above_third_differences_of_late_and_is_taken_where_it_stays():
+    t = np.arange(400.0)
+    parabola = 3.0 - 0.2 * t + 0.01 * t**2
+    assert 100 not in jumps_of(parabola + 0.011 * (t == 100))
+    assert jumps_of(parabola + 0.013 * (t == 100)) == [100]
+    assert jumps_of(parabola + 0.013 * (t == FEWEST))[:1] != [FEWEST]  # too few before it
+    # 3 · 4 · 5 / 6 times as much is tolerated two samples later. Of the parabola through 98, 99 and
+    # 102, those at 103 and 104 depart by .0667 and .15, over 20 and 60.
+    shifted = jumps_of(parabola + 0.1 * (t >= 100))
+    assert shifted[:4] == [100, 101, 103, 104]
+    assert shifted[-1] < 130
+    assert jumps_of(parabola + 0.1 * (t >= 100), 0.1) == jumps_of(1e9 * t**9, np.inf) == []
+    noise = np.random.default_rng(0).standard_normal(4000)
+    usual = np.sqrt(20.0)  # third differences of white noise: 1, 3, 3, 1
+    assert 1000 not in jumps_of(noise + 0.8 * JUMP * usual * (np.arange(4000) == 1000))
+    assert jumps_of(noise + 1.3 * JUMP * usual * (np.arange(4000) == 1000)) == [1000]
+    # Gaps lower the divided differences of noise, and not what is usual.
+    gaps = noise.copy()
+    gaps[1:2000:2] = np.nan
+    assert jumps_of(gaps) == []
+    rougher = np.concatenate([noise, 30 * noise])
+    assert 0 < len(jumps_of(rougher)) < 400
+    assert jumps_of(rougher)[-1] < 5500
 
 
 def test_what_is_missing_is_filled_from_the_record_after_the_last_gap():

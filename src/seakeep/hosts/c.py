@@ -21,7 +21,7 @@ from seakeep.models.live import AFTER, Live
 from seakeep.models.terms import SlowSquare, Term
 from seakeep.models.validity import CYCLES, PER_OCTAVE, TRAINED
 from seakeep.signals.expressions import Text
-from seakeep.signals.prediction import MEMORY, NOISE
+from seakeep.signals.prediction import FEWEST, JUMP, MEMORY, NOISE, OF_LATE
 from seakeep.waves import GRAVITY
 
 KIND = "C source"
@@ -155,6 +155,9 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
             "is_elevation": is_elevation,
             "noise_part": NOISE,
             "after": AFTER,
+            "jump": JUMP,
+            "of_late": float(OF_LATE),
+            "fewest": FEWEST,
             "doubted": DOUBTED,
         }
         for end in ("h", "c"):

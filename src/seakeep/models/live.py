@@ -47,7 +47,13 @@ from seakeep.models.growth import WINDOWS, LeadErrors, weighed
 from seakeep.models.inputs import Drive, Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.validity import Conditions, Coverage, Validity
-from seakeep.signals.prediction import close_gaps, fill_future, predict_waves, predictable_time
+from seakeep.signals.prediction import (
+    Jumps,
+    close_gaps,
+    fill_future,
+    predict_waves,
+    predictable_time,
+)
 
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
@@ -66,6 +72,10 @@ LATE = 16
 """Complete samples that are judged together: each alone would cost three times as much."""
 AFTER = 32
 """Samples after a gap from which on what comes is predicted from them alone."""
+SMOOTH = 0.01
+"""Part of a channel's SD in training that the RMS of its third differences is at least."""
+MOTIONS = ("m", "rad", "m/s", "rad/s")
+"""Units of states in which no sample jumps; loads and accelerations know impacts."""
 SMALL = 0.5
 """Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
@@ -131,6 +141,8 @@ class _Counts:
         Those since the start of a free run.
     unseen : int
         Those in a row without any state.
+    doubtful : int
+        Those to come for which a jump of a state makes errors doubtful.
     """
 
     taken: int = 0
@@ -140,6 +152,7 @@ class _Counts:
     complete: int = 0
     lead: int = 0
     unseen: int = 0
+    doubtful: int = 0
 
 
 class Live:
@@ -239,6 +252,7 @@ class Live:
         widths |= {"delayed": delayed, "direct": direct}
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
+        self._jumps, self._jumped = Jumps(self._smoothest()), np.zeros(inputs + count, bool)
         # None of a complete sample after complete ones, which is taken as it is.
         self._updates: deque[_Update | None] = deque(maxlen=self._ahead + LATE + 2)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
@@ -333,9 +347,10 @@ class Live:
         """What lies outside the training: waves, mean surge, or errors of late; or lost waves.
 
         Errors do where :attr:`consistency_by_state` exceeds two for a state, one step ahead or in
-        free runs. Waves are lost while estimate or forecast go back to any that were not measured,
-        beyond gaps of a quarter of their period, which are closed. While nothing at all is measured
-        they are not: the band holds what they do.
+        free runs, and for some samples after a state has jumped. Waves are lost while estimate or
+        forecast go back to any that were not measured, beyond gaps of a quarter of their period,
+        which are closed. While nothing at all is measured they are not: the band holds what they
+        do.
         """
         return self._validity(self.conditions, self._closed())
 
@@ -346,8 +361,23 @@ class Live:
             lost = lost[: len(lost) - dark]
         if lost[-self._begins - min(self._count.since, len(self.errors.rms)) :].any():
             outside |= Validity.LOST
-        alarm = bool(np.any(self.consistency_by_state > ALARM))
+        alarm = self._count.doubtful > 0 or bool(np.any(self.consistency_by_state > ALARM))
         return outside | Validity.CONSISTENCY if alarm else outside
+
+    @property
+    def jumped(self) -> tuple[str, ...]:
+        """Channels whose last sample was taken as lost, as no wave or motion jumps so far."""
+        names = self.signature.inputs + self.signature.states
+        return tuple(name for name, yes in zip(names, self._jumped, strict=True) if yes)
+
+    def _smoothest(self) -> FloatArray:
+        """RMS of third differences of inputs and states at least; infinite where they may jump."""
+        coverage, signature = self.model.coverage, self.signature
+        is_wave = coverage.elevations & np.isin(np.arange(len(signature.inputs)), self._waves)
+        moves = [label.units in MOTIONS for label in signature.state_labels]
+        spread = np.concatenate([0.25 * coverage.heights, signature.state_scale.spread])
+        is_smooth = np.concatenate([is_wave, moves]) & (spread > 0)
+        return np.where(is_smooth, SMOOTH * spread, np.inf)
 
     @property
     def _surge(self) -> FloatArray | None:
@@ -380,6 +410,8 @@ class Live:
             "gap": self._gap,
             "foresight": self._foresight,
             "waves": self._waves,
+            "smoothest": self._jumps.least,
+            "doubtful": self._ahead + LATE,
         }
 
     def _rows(self, name: str, first: int, stop: int) -> FloatArray:
@@ -408,13 +440,13 @@ class Live:
         y : array_like, shape (N,), or mapping of names to numbers, optional
             Measured states at this instant, with what is missing as in `u`.
         time : float, optional
-            Instant of the sample, s, to check that none was left out. By default one step after
-            the last; the first is 0.
+            Instant of the sample, s, to check that none was left out: one step after the last, to a
+            hundredth of a step. By default just that; the first is 0.
 
         Returns
         -------
         ndarray, shape (N,)
-            :attr:`state`.
+            :attr:`state`. What jumps as no wave or motion does is missing: :attr:`jumped`.
 
         Raises
         ------
@@ -425,6 +457,15 @@ class Live:
         signature, at = self.signature, self._count.taken
         instant = self._instant(time)
         states, sample = _sample("y", y, signature.states), _sample("u", u, signature.inputs)
+        if at < 4 and np.isnan(sample).any():
+            raise RequestError(
+                f"inputs that are missing are predicted from the samples before, and there are "
+                f"{at}. Start with at least 4 samples of all of u; of a probe that is dead, with "
+                "its mean, or fit a model without it."
+            )
+        self._jumped = self._jumps.of(np.concatenate([sample, states]))
+        sample[self._jumped[: sample.size]] = np.nan
+        states[self._jumped[sample.size :]] = np.nan
         inputs = self._filled(sample)
         if at - self._first == 2 * self._record:  # all room is used up
             for values in self._recent.values():
@@ -435,6 +476,9 @@ class Live:
         # Held until it is estimated: an alignment reads where the vessel is.
         recent["x"][row] = np.where(np.isfinite(states), states, recent["x"][row - 1])
         self._count.taken += 1
+        self._count.doubtful = max(self._count.doubtful - 1, 0)
+        if self._jumped[sample.size :].any():
+            self._count.doubtful = self._ahead + LATE
         self._time = instant
         self._filtered(at, np.isfinite(states))
         self._settle(at)
@@ -457,20 +501,16 @@ class Live:
             )
         raise RequestError(
             f"time = {instant:g} s is {instant - self._time:g} s after the last sample, and the "
-            f"model steps by {dt:g} s. Call step() without arguments once for each sample that "
-            "was lost; resample the rest to the model's step."
+            f"model steps by {dt:g} s, to a hundredth. Call step() without arguments once for "
+            "each sample that was lost; resample the rest to the model's step, as "
+            "campaign.live_chain does."
         )
 
     def _filled(self, inputs: FloatArray) -> FloatArray:
         """Inputs of a sample; what was lost comes from each record, and from the probe up-wave."""
-        taken, lost = self._count.taken, np.isnan(inputs)
+        lost = np.isnan(inputs)
         if not lost.any():
             return inputs
-        if taken < 4:
-            raise RequestError(
-                f"inputs that are missing are predicted from the samples before, and there are "
-                f"{taken}. Start with at least 4 samples of all of u."
-            )
         known = self._known_inputs()
         if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
             expected, waves = known[-1].copy(), self._waves
@@ -626,7 +666,10 @@ class Live:
 
     def _judge(self, at: int, update: _Update | None, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""
-        self._innovation, lead = innovation, self._count.lead
+        # What filled lost waves drives no free run; without any, the old ones are forgotten.
+        read = self._rows("lost", max(at - self._begins, self._first), at + self._ahead)
+        is_driven = not read[:, self._waves].any()
+        self._innovation, lead = innovation, self._count.lead * is_driven
         measured = self._row("y", at)
         squares = np.full((2, measured.size), np.nan)
         with np.errstate(over="ignore"):
@@ -639,8 +682,11 @@ class Live:
         self._squares *= np.where(known, self._fade, 1.0)
         self._squares[0] += np.where(known, np.minimum(squares, SPIKE), 0.0)
         self._squares[1] += known
+        if not is_driven:
+            sums, weights = self._squares[:, 1]
+            sums += (1.0 - self._fade[1]) * (weights - sums)
         lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
-        if not lead and (update is None or self._noise.any()):
+        if not lead and is_driven and (update is None or self._noise.any()):
             self._free[:], lead = self._history, 1
         self._count.lead = lead
 
@@ -887,7 +933,7 @@ class Live:
         rows.append(self._rows("x", max(tail - len(self.errors.rms), self._first), taken))
         updates = filter(None, self._pending())
         state = [self._history, self._free, self._innovation, self._squares]
-        state += [self._known_inputs(), self._known_inputs("lost")]
+        state += [self._known_inputs(), self._known_inputs("lost"), self._jumps.memory]
         if self._surge is not None:
             state.append(self._surge)
         return [*rows, *(each for update in updates for each in update), *state]

@@ -37,6 +37,8 @@ enum {
 {{ array("noise", noise) -}}
 {{ array("centre", centre) -}}
 {{ array("spread", spread) }}
+/* RMS of third differences of inputs and states at least; infinite where they may jump. */
+{{ array("smoothest", smoothest) }}
 /* Errors of free runs in training, a row per sample after the start. */
 {{ array("errors", errors) }}
 /* Inputs that are predicted; the others stay at their last value. */
@@ -366,38 +368,76 @@ static void settle({{ name }}_estimator *e)
         advance(e, x, back, 0);
 }
 
+/* Take as lost what jumps: far above those of late in the third difference from the last three taken. */
+static void smooth({{ name }}_estimator *e, double *sample)
+{
+    e->doubtful -= e->doubtful > 0;
+    for (int i = 0; i < Q + N; i++) {
+        double *x = e->last[i], *age = e->age[i], a = ++age[0], b = ++age[1], c = ++age[2];
+        double away = sample[i] - x[0] * (b * c) / ((b - a) * (c - a)), usual;
+        int jumps;
+        away -= x[1] * (a * c) / ((a - b) * (c - b)) + x[2] * (a * b) / ((a - c) * (b - c));
+        away = fabs(6.0 / (a * b * c) * away);
+        usual = fmax(sqrt(e->squares[i] / fmax(e->weight[i], 1.0)), smoothest[i]);
+        jumps = away > {{ jump | hex }} * usual && e->weight[i] >= {{ fewest }};
+        if (c == 3.0 && !isnan(sample[i]) && !isinf(smoothest[i])) {
+            e->squares[i] *= 1.0 - 1.0 / {{ of_late }};
+            e->weight[i] *= 1.0 - 1.0 / {{ of_late }};
+            e->squares[i] += pow(fmin(away, {{ (0.5 * jump) | hex }} * usual), 2.0);
+            e->weight[i] += 1.0;
+        }
+        if (jumps) {
+            sample[i] = NAN;
+            e->doubtful = i < Q ? e->doubtful : {{ doubtful }};
+        } else if (!isnan(sample[i])) {
+            memmove(x + 1, x, 2 * sizeof(double));
+            memmove(age + 1, age, 2 * sizeof(double));
+            x[0] = sample[i];
+            age[0] = 0.0;
+        }
+    }
+}
+
 int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *y)
 {
-    double sample[Q + 1], *newest = e->x + (X_ROWS - 1) * N;
+    double sample[Q + N], *newest = e->x + (X_ROWS - 1) * N;
     int rows[N], count = 0, exact = 1, lost = 0, plain;
-    for (int i = 0; i < N; i++) {
+    for (int i = 0; i < N; i++)
         if (isinf(y[i]))
             return 1;
-        exact = exact && noise[i] == 0.0;
-        if (!isnan(y[i]))
-            rows[count++] = i;
-    }
-    for (int q = 0; q < Q; q++) {
+    for (int q = 0; q < Q; q++)
         if (isinf(u[q]) || (isnan(u[q]) && e->filled < 4))
             return 1;
-        lost = lost || isnan(u[q]);
-    }
-    if (lost)
-        expect(e, 1);
-    for (int q = 0; q < Q; q++)
-        sample[q] = isnan(u[q]) ? e->inputs[RECORD * Q + q] : u[q];
     if (e->taken == 0) {
         e->partly = 1;
         for (int i = 0; i < M; i++)
             e->history[i] = centre[i % N];
+        for (int i = 0; i < Q + N; i++)
+            for (int k = 0; k < 3; k++)
+                e->age[i][k] = NAN;
     }
+    memcpy(sample, u, Q * sizeof(double));
+    memcpy(sample + Q, y, N * sizeof(double));
+    smooth(e, sample);
+    y = sample + Q;
+    for (int i = 0; i < N; i++) {
+        exact = exact && noise[i] == 0.0;
+        if (!isnan(y[i]))
+            rows[count++] = i;
+    }
+    for (int q = 0; q < Q; q++)
+        lost = lost || isnan(sample[q]);
+    if (lost)
+        expect(e, 1);
     e->slot = (e->slot + 1) % (LATE + 1);
     memcpy(e->y[e->slot], y, N * sizeof(double));
     memmove(e->inputs, e->inputs + Q, (RECORD - 1) * Q * sizeof(double));
-    memcpy(e->inputs + (RECORD - 1) * Q, sample, Q * sizeof(double));
     memmove(e->lost, e->lost + Q, (RECORD - 1) * Q);
-    for (int q = 0; q < Q; q++)
-        e->lost[(RECORD - 1) * Q + q] = isnan(u[q]) != 0;
+    for (int q = 0; q < Q; q++) {
+        int row = (RECORD - 1) * Q + q;
+        e->lost[row] = isnan(sample[q]) != 0;
+        e->inputs[row] = e->lost[row] ? e->inputs[RECORD * Q + q] : sample[q];
+    }
     e->filled += e->filled < RECORD;
     memmove(e->delayed, e->delayed + DELAYED, (ROWS - 1) * DELAYED * sizeof(double));
     memmove(e->x, e->x + N, (X_ROWS - 1) * N * sizeof(double));
@@ -518,7 +558,7 @@ static void close_gaps({{ name }}_estimator *e)
 
 int {{ name }}_validity({{ name }}_estimator *e)
 {
-    int size = e->filled, outside = 0;
+    int size = e->filled, outside = e->doubtful ? {{ upper }}_CONSISTENCY : 0;
     int back = BEGINS + (e->since < LEADS ? e->since : LEADS), tail = dark_rows(e);
     tail = tail <= e->unseen ? tail : 0; /* the band holds what comes of it */
     for (int row = RECORD - (size < back ? size : back); row < RECORD - tail; row++)

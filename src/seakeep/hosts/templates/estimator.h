@@ -30,8 +30,9 @@ enum {
 
 /* What of the waves, or of the mean surge, lies outside the training; or whether waves were lost that
  * estimates and forecasts go back to, beyond gaps of up to {{ gap }} samples, which are closed. While
- * nothing at all is measured they are not: forecasts hold what they do. */
-enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8, {{ upper }}_LOST = 32 };
+ * nothing at all is measured they are not: forecasts hold what they do. Consistency says that a state
+ * jumped of late, and was taken as lost. */
+enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8, {{ upper }}_CONSISTENCY = 16, {{ upper }}_LOST = 32 };
 
 /* All that an estimator remembers. To save and restore it, copy it as it is. */
 typedef struct {
@@ -46,7 +47,9 @@ typedef struct {
     /* Of the samples that waves to come move: */
     double y[{{ late + 1 }}][{{ upper }}_STATES], gains[{{ late + 1 }}][{{ upper }}_EXTENDED * {{ upper }}_STATES];
     int plain[{{ late + 1 }}], slot, pending, begun;
-    int filled, taken, since, partly, complete, unseen;
+    int filled, taken, since, partly, complete, unseen, doubtful;
+    /* Of inputs and states: the last three that were taken, their ages, and squares of third differences. */
+    double last[{{ Q + N }}][3], age[{{ Q + N }}][3], squares[{{ Q + N }}], weight[{{ Q + N }}];
     /* What lies below is work space. */
     double ahead[{{ upper }}_EXTENDED], cross[{{ upper }}_EXTENDED * {{ upper }}_STATES];
     double forward[{{ record + fore }}], backward[{{ record + fore }}];
