@@ -149,8 +149,8 @@ def fit_campaign(
     if spec.standardize:
         _warn_of_slow_model(identified, runs)
     single: Any = identified.centre if is_ensemble(identified) else identified
-    is_one = single is not None and not single.signature.parameter  # else runs differ on purpose
-    if is_one and single.settings.role == "model":
+    varies = identified.signature.parameter  # then runs differ on purpose
+    if single is not None and single.settings.role == "model" and not varies:
         for each in disagreements(single.settings, until(runs, stop), *channels):
             warn(each.describe())
     return identified
