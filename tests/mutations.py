@@ -383,7 +383,7 @@ CHANGES = {
     ],
     "models/selection.py": [
         ("widest = replace(widest, window=None)  #", "pass  #", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
-        ("max(before, size - widest.window + inside)", "max(before, size - widest.window)", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
+        ("size - 1, widest.window, before, 0, widest.history", "size - 1, widest.window, before, 0, 'before'", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
         ("list(self.read)[: len(self.read) - LAST + 1]", "[]", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("order = folds[::-1] if again else folds", "order = folds", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("key.lead != lead, near[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),

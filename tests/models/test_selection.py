@@ -177,7 +177,7 @@ def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all():
 @pytest.mark.parametrize("history", ["before", "inside"])
 def test_the_parts_of_a_single_run_are_those_of_its_training_window(history):
     run = runs(1)["run0"]
-    window, reach = 900, max(SPEC.state_delays, SPEC.input_delays)
+    window, reach = 400, max(SPEC.state_delays, SPEC.input_delays)
     read = window if history == "inside" else window + reach
     spec = replace(SPEC, observables=(), history=history)
     late = {"run": run.isel(time=slice(-read, None))}

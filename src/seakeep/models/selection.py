@@ -30,7 +30,7 @@ import numpy as np
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.core import metrics
-from seakeep.core.embedding import spread_means
+from seakeep.core.embedding import spread_means, training_window
 from seakeep.core.gram import PrimalSystem, ridge_path
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.executor import in_order
@@ -438,10 +438,10 @@ def _problem(
     pieces = dict(runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
         pieces = {}
-        inside = before if widest.history == "inside" else 0
         for name, run in runs.items():
             size = run.sizes["time"]
-            begin = before if widest.window is None else max(before, size - widest.window + inside)
+            place = training_window(size - 1, widest.window, before, 0, widest.history)
+            begin = max(place.first_column, before)
             edges = np.linspace(begin, size - after, folds + 1).astype(int)
             for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
                 samples = slice(max(first - before, 0), stop + after)
