@@ -379,7 +379,7 @@ class Subspace(Plain):
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> SubspaceModel:
         """Rebuild the model that a file holds."""
-        own = unpack(dataset, space=StateSpace, errors=LeadErrors)
+        own = unpack(dataset, space=StateSpace, errors=LeadErrors | None)
         return SubspaceModel(**own, **unpacked(dataset, cls))
 
 

@@ -414,7 +414,7 @@ class HankelEnsemble(Model):
             held = self.hold(executor=executor, progress=progress)
             progress = None  # the rest is a small part
         parts = member_series(held, [windows, *windows.departures], executor, progress)
-        if windows.departures:
+        if windows.departures and held.errors is not None:
             runs, signature = [series for series, _ in parts], self.signature
             weigh_members(windows, runs, held.errors, signature.state_scale)
             for each in signature.readouts:  # what moved the members ends at a floor
@@ -655,16 +655,15 @@ class HankelEnsemble(Model):
         return [self.dynamics(number) for number in range(first, len(self._taught))]
 
     @cached_property
-    def errors(self) -> LeadErrors:
-        """Errors of the members' mean on what they learnt from."""
+    def errors(self) -> LeadErrors | None:
+        """Errors of the members' mean on what they learnt from; None where that is too short."""
         signature, arrays, members = self.signature, self.arrays, self._means
         series: Any = zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
-        if signature.input_map.reference:
+        first = signature.history_samples - 1
+        if signature.input_map.reference:  # departures need no period before a start
             series = departing(series, signature.input_map)
-        stretches = [
-            Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
-            for x, u, v in series
-        ]
+            first = max(signature.state_delays, signature.input_delays)
+        stretches = [Stretch(x, u, v, first, min(len(x) - 1, len(u))) for x, u, v in series]
         return linear_errors(members, stretches, signature.readouts)
 
     def _drawn(self, name: str) -> str:

@@ -129,7 +129,7 @@ def linear_errors(
     members: Sequence[Dynamics],
     stretches: Sequence[Stretch],
     readouts: Sequence[FittedReadOut] = (),
-) -> LeadErrors:
+) -> LeadErrors | None:
     """Errors of the mean of linear members in their training runs."""
     own = [each.signature for each in members]
     return lead_errors(
@@ -147,8 +147,8 @@ def lead_errors(
     unknowns: float,
     stretches: Sequence[Stretch],
     readouts: Sequence[FittedReadOut] = (),
-) -> LeadErrors:
-    """Errors of forecasts in training runs.
+) -> LeadErrors | None:
+    """Errors of forecasts in training runs; None where no stretch has room for one.
 
     Residuals are those of the states as they are regressed; free runs are read off as forecasts
     are.
@@ -166,6 +166,9 @@ def lead_errors(
     readouts : sequence of FittedReadOut
         Its read-outs.
     """
+    stretches = [each for each in stretches if each.last > each.first]
+    if not stretches:
+        return None
     longest = max(each.last - each.first for each in stretches)
     steps = max(1, min(max(REACH * (max(delays) + 1), LEAST), longest // 2))
     residuals = _errors(forecast, delays, stretches, 1, STEPS)[:, 0]
@@ -225,8 +228,10 @@ def stretches_of(data: TrainingData, signature: Signature, runs: Datasets) -> li
     for number, (name, window) in enumerate(zip(data.names, data.windows, strict=True)):
         if input_map.follows is not None or input_map.reference:
             source = Source(signature, name, runs[name], data.begin(number))
-        first = window.first_column + input_map.reference
-        own = data.physical(number)
+        first, own = window.first_column, data.physical(number)
+        if input_map.reference:  # which the run holds before a start, not the window
+            skipped = round((data.begin(number) - float(runs[name]["time"][0])) / signature.dt)
+            first = max(first, signature.history_samples - 1 - skipped)
         stretches.append(Stretch(*own, first, window.last, source, data.zero(number)))
     return stretches
 

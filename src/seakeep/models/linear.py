@@ -114,11 +114,11 @@ class HankelDMDcModel(Model):
         if self.variation is None:
             return self._errors_in(data, runs)
         parts = data_by_value(data, runs, self.signature.parameter)
-        return LeadErrors.together(
-            [self.at(parameter=value)._errors_in(part, runs) for value, part in parts.items()]
-        )
+        each = [self.at(parameter=value)._errors_in(part, runs) for value, part in parts.items()]
+        known = [errors for errors in each if errors is not None]
+        return LeadErrors.together(known) if known else None
 
-    def _errors_in(self, data: TrainingData, runs: Datasets) -> LeadErrors:
+    def _errors_in(self, data: TrainingData, runs: Datasets) -> LeadErrors | None:
         stretches = stretches_of(data, self.signature, runs)
         return linear_errors([self.dynamics], stretches, self.signature.readouts)
 

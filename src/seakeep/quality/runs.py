@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import scipy
@@ -126,10 +126,11 @@ def shared_files(runs: Datasets) -> Findings:
     for (name, first), (other, second) in combinations(runs.items(), 2):
         both = (first.attrs, second.attrs)
         files = [set(each.get("file_sha256", "").split()) for each in both]
-        uses = [(*each.get("train_span", ()), *each.get("test_span", ())) for each in both]
-        begin = max(min(use, default=np.inf) for use in uses)
-        end = min(max(use, default=-np.inf) for use in uses)
-        if begin < end and files[0] & files[1]:
+        used = [[each[k] for k in ("train_span", "test_span") if k in each] for each in both]
+        parts = [(max(a[0], b[0]), min(a[1], b[1])) for a, b in product(*used)]
+        shared = [part for part in parts if part[0] < part[1]]
+        if shared and files[0] & files[1]:
+            begin, end = min(shared)[0], max(part[1] for part in shared)
             yield Finding(RunsKind.FILE, other, "file", end, None, "s", begin, {"other": name})
 
 

@@ -200,7 +200,7 @@ def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     """
     channel = canonical_channel(name)
     symbol = f"${channel.symbol}$ " if channel else ""
-    words = wrapped(plain_text(long_name_of(name, long_name)), WIDEST)
+    words = plain_text(wrapped(long_name_of(name, long_name), WIDEST))
     return f"{words}\n{symbol}[{shown_unit(units) or '?'}]"
 
 
@@ -216,7 +216,7 @@ def wrapped(words: str, widest: int = NARROW) -> str:
         textwrap.wrap(words, width, break_long_words=width == widest, break_on_hyphens=False)
         for width in range(1, widest + 1)
     ]
-    lines = min((each for each in wraps if max(map(len, each)) <= widest), key=len)
+    lines = min((each for each in wraps if max(map(len, each), default=0) <= widest), key=len)
     return "\n".join(lines)
 
 

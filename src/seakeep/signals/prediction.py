@@ -196,7 +196,7 @@ class Jumps:
         self.memory[6:] = 0.0
 
     def of(self, sample: FloatArray) -> BoolArray:
-        """Which values of the next sample jump; NaN where there is none."""
+        """Which values of the next sample jump; it holds NaN where there is none."""
         first, second, third, a, b, c, squares, weight = self.memory
         for age in (a, b, c):
             age += 1
@@ -208,7 +208,7 @@ class Jumps:
         jumps = (away > JUMP * usual) & (weight >= FEWEST)
         taken = np.isfinite(sample) & ~jumps
         # Jumps count too, but not for all that they are: what has become rougher is soon usual.
-        beside = (c == 3) & np.isfinite(sample) & np.isfinite(self.least)
+        beside = ((c == 3) | jumps) & np.isfinite(sample) & np.isfinite(self.least)
         squares *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
         weight *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
         with np.errstate(over="ignore"):

@@ -26,8 +26,9 @@ from seakeep.signals.waves import noise_level, tapered_power
 LARGEST_DRIFT = 1e-3
 """Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
 
-SIGNAL = 0.99
-"""Part of what a signal has above its noise that is compared where two loggers record it."""
+SIGNAL, ABOVE = 0.99, 20.0
+"""Part of the squared slope of a signal, which tells instants, that is compared where two loggers
+record it, and the power over that of its noise from which on it counts."""
 
 ASSUMED = "assumed the same as the reference's"
 """Method of a clock of which nothing is known."""
@@ -324,10 +325,13 @@ def clock_from_shared(
     edge = max(_highest_frequency(x, usual_step(times)) for x, times in ((a, c), (b, t)))
     a, b = (_below(edge, x, usual_step(times)) for x, times in ((a, c), (b, t)))
     other = CubicSpline(t, b)
+    # The ends of the filters are left out.
+    ends = [2.0 / edge if 0 < edge < 0.2 / usual_step(times) else 0.0 for times in (c, t)]
+    whole = (c >= c[0] + ends[0]) & (c <= c[-1] - ends[0])
     centre = float(c.mean())
     for _ in range(6):
         instants = (c - offset) / rate
-        inside = (instants >= t[0]) & (instants <= t[-1])
+        inside = whole & (instants >= t[0] + ends[1]) & (instants <= t[-1] - ends[1])
         slope = other(instants[inside], 1)
         turn = -slope * (c[inside] - centre)
         (shift, stretch), errors, left, gain = _adjusted(
@@ -351,10 +355,11 @@ def clock_from_shared(
 
 
 def _highest_frequency(series: FloatArray, dt: float) -> float:
-    """Frequency below which nearly all lies that a signal has above its noise, Hz."""
+    """Frequency below which nearly all of a signal's slope lies that stands above its noise, Hz."""
     power = tapered_power(series)
-    grown = np.cumsum(power - noise_level(power))
-    return float(np.argmax(grown >= SIGNAL * grown.max()) / (series.size * dt))
+    slope = np.where(power > ABOVE * noise_level(power), power, 0.0) * np.arange(power.size) ** 2.0
+    grown = np.cumsum(slope)
+    return float(np.argmax(grown >= SIGNAL * grown[-1]) / (series.size * dt))
 
 
 def _below(edge: float, series: FloatArray, dt: float) -> FloatArray:

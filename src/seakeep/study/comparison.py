@@ -611,8 +611,8 @@ def _say_status_anew(forecast: xr.Dataset) -> None:
 
 def _times(factor: float, value: Any) -> Any:
     """A number, or a pair of them, times a factor."""
-    is_pair = isinstance(value, tuple | list)
-    return tuple(factor * float(v) for v in value) if is_pair else factor * float(value)
+    array = factor * np.asarray(value, dtype=float)
+    return tuple(array.tolist()) if array.ndim else float(array)
 
 
 def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> xr.Dataset:

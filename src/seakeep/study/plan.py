@@ -192,7 +192,7 @@ def _places(
 ) -> list[tuple[str, int]]:
     """Feasible last samples in random order; with 'apart' no two within `width` samples.
 
-    The first one of each share goes before all others: a share is named by the runs that it holds.
+    `shares` names the share of each run: the first place of each share goes before all others.
     """
     drawn = asked.placement == "random"
     step = 1 if drawn else max(width, 1)

@@ -380,7 +380,7 @@ static void smooth({{ name }}_estimator *e, double *sample)
         away = fabs(6.0 / (a * b * c) * away);
         usual = fmax(sqrt(e->squares[i] / fmax(e->weight[i], 1.0)), smoothest[i]);
         jumps = away > {{ jump | hex }} * usual && e->weight[i] >= {{ fewest }};
-        if (c == 3.0 && !isnan(sample[i]) && !isinf(smoothest[i])) {
+        if ((c == 3.0 || jumps) && !isnan(sample[i]) && !isinf(smoothest[i])) {
             e->squares[i] *= 1.0 - 1.0 / {{ of_late }};
             e->weight[i] *= 1.0 - 1.0 / {{ of_late }};
             e->squares[i] += pow(fmin(away, {{ (0.5 * jump) | hex }} * usual), 2.0);
