@@ -86,7 +86,7 @@ def service(campaign):
     u = np.stack([run[each].values for each in model.inputs], axis=1)
     y = np.stack([run[each].values for each in model.states], axis=1)
     live, at = model.live(like=run), 1500
-    for number in range(at):
+    for number in range(at + 1):
         live.step(u[number], y[number])
     dead = y.copy()
     dead[:, 0] = np.nan
