@@ -290,7 +290,7 @@ CHANGES = {
         ("direct - zeros[1]", "direct", "models/test_centre.py::test_regressors_depart_from_their_means_over_the_reference_period"),
         ("drive.table(span.first, span.stop) - zeros[0][number]", "drive.table(span.first, span.stop)", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
         ("values += windows.zero[:, None]", "pass", "models/test_centre.py::test_a_zero_moves_the_forecast_and_changes_nothing_else"),
-        ("filled(signature, values, start + 1, self.run)", "filled(signature, values, start + 1)", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
+        ("foresight(signature, self.run)", "foresight(signature)", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
     ],
     "models/ensemble.py": [
         ("data.regress(draw.settings)", "data.regress(self.settings)", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
@@ -312,7 +312,7 @@ CHANGES = {
         ("first = max(len(after) - signature.lead_samples + 1, 0)", "first = 0", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),
     ],
     "models/growth.py": [
-        ("scale.centre + zero", "scale.centre", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
+        ("scale.centre + windows.zero[number]", "scale.centre", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
         ("if windows.departures and model.errors is not None:", "if False:", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
         ("return (n + p) / (n - p)", "return 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
         ("self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),

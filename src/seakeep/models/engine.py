@@ -448,7 +448,7 @@ class _Opened:
                 "measured surge, which nothing continues. Forecast fewer steps, or fit a model "
                 "with surge = 'predicted' or 'none'."
             )
-        futures, missing = filled(signature, values, start + 1, self.run)
+        futures, missing, _ = fill_future(values, start + 1, foresight(signature, self.run))
         self.known = missing - 1
         names = [each for each in (*signature.inputs, *signature.states) if each in self.run]
         run = self.run[names].reindex(time=self.instants(0, stop, signature.dt))
@@ -457,17 +457,6 @@ class _Opened:
             columns = zip(signature.inputs, future.T, strict=True)
             continued.append(run.assign({name: run[name].copy(data=x) for name, x in columns}))
         return continued
-
-
-def filled(
-    signature: Signature, values: FloatArray, known: int, run: xr.Dataset | None = None
-) -> tuple[FloatArray, int]:
-    """Inputs with what is missing from a sample on, and the first sample that is.
-
-    As :func:`seakeep.signals.prediction.fill_future`.
-    """
-    futures, first, _ = fill_future(values, known, foresight(signature, run))
-    return futures, first
 
 
 def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Foreseen]:

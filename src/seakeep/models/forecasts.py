@@ -33,6 +33,7 @@ from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix
 from seakeep.models.settings import Needs, Role
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
+from seakeep.signals.prediction import fill_future
 from seakeep.signals.time_axis import instant_text, span_text
 
 STATISTICS = ("mean", "std", "lower", "upper")
@@ -544,7 +545,7 @@ def check_arrays(
     if missing := needed - len(after):
         _finite("u_history", past)
         whole = np.pad(whole, ((0, missing), (0, 0)), constant_values=np.nan)
-        futures, _ = engine.filled(signature, whole, len(past))
+        futures, *_ = fill_future(whole, len(past), engine.foresight(signature))
         first = max(len(after) - signature.lead_samples + 1, 0)
     windows, *departures = (
         engine.array_windows(signature, x[None], each[None, -z - 1 - needed :], count)

@@ -318,8 +318,9 @@ def weigh_members(
     for number, first in enumerate(windows.predicted):
         whole = np.isfinite(parts[0][:, number]).all(axis=(1, 2))
         whole |= not whole.any()
-        zero = 0.0 if windows.zero is None else windows.zero[number]
-        own = replace(scale, centre=scale.centre + zero)
+        own = scale
+        if windows.zero is not None:
+            own = replace(scale, centre=scale.centre + windows.zero[number])
         for column in range(squares.shape[1] if first >= 0 else 0):  # one by one, for memory
             at = slice(column, column + 1)
             runs = np.stack([each[whole, number, :, at] for each in parts], axis=1)

@@ -209,8 +209,7 @@ class Jumps:
         taken = np.isfinite(sample) & ~jumps
         # Jumps count too, but not for all that they are: what has become rougher is soon usual.
         beside = ((c == 3) | jumps) & np.isfinite(sample) & np.isfinite(self.least)
-        squares *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
-        weight *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
+        self.memory[6:] *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
         with np.errstate(over="ignore"):
             squares += np.where(beside, np.minimum(away, 0.5 * JUMP * usual) ** 2, 0.0)
         weight += beside
