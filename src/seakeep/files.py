@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from seakeep.arrays import Datasets, Groups
 
-FORMAT = 11
+FORMAT = 12
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""

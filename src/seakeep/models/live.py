@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, partial
@@ -129,8 +128,6 @@ class _Counts:
     ----------
     taken : int
         All.
-    final : int
-        Number of the last one whose estimate no later wave moves; the first sample is 0.
     since : int
         Those since the whole history was measured.
     partly : bool
@@ -146,7 +143,6 @@ class _Counts:
     """
 
     taken: int = 0
-    final: int = -1
     since: int = 0
     partly: bool = True
     complete: int = 0
@@ -253,8 +249,9 @@ class Live:
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
         self._jumps, self._jumped = Jumps(self._smoothest()), np.zeros(inputs + count, bool)
-        # None of a complete sample after complete ones, which is taken as it is.
-        self._updates: deque[_Update | None] = deque(maxlen=self._ahead + LATE + 2)
+        # Of the samples whose estimates are not final; None of a complete sample after complete
+        # ones, which is taken as it is.
+        self._updates: list[_Update | None] = []
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
         # Of squares that fade: sums, and weights; of each state, and of each in free runs.
@@ -551,7 +548,7 @@ class Live:
         is_exact = bool(seen.all()) and not self._noise.any()
         update = None
         if not is_exact or count.since or at < self._begins:
-            self._predict_covariance(at, count.since, blind=not (count.partly or seen.any()))
+            self._predict_covariance(at, blind=not (count.partly or seen.any()))
             deviations = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
             update = _Update(self._filter.measure(seen), deviations)
         self._updates.append(update)
@@ -565,12 +562,13 @@ class Live:
             count.since += 1
             count.partly = count.partly or bool(seen.any())
 
-    def _predict_covariance(self, at: int, since: int, *, blind: bool) -> None:
-        """Covariance of a sample before its measurement, so many after a whole history.
+    def _predict_covariance(self, at: int, *, blind: bool) -> None:
+        """Covariance of a sample before its measurement.
 
-        While `blind` since then it depends on their number alone, and stays as it is from free
-        runs as long as those of training on, and a history.
+        While `blind` since the whole history was measured, it stays as it is from free runs as
+        long as those of training on, and a history.
         """
+        since = self._count.since
         if blind and since >= len(self.errors.rms) + self.signature.state_delays:
             return
         if at < self._begins:
@@ -581,48 +579,44 @@ class Live:
 
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
-        count = self._count
         if at < self._begins:
-            self._advance(self._history, at, at)
-            count.final = at
+            self._advance(self._history, 1)
+            self._updates.clear()
             return
         self._finish(LATE)
         if self._is_exact():
-            if count.final < at:
-                self._row("x", at)[:] = self._row("y", at)
             return
         known = self._known_inputs()
         if self._ahead and self.signature.inputs:
             known = np.concatenate([known, self._expected(known, self._ahead)])
         self._find_rows(at, known)
-        self._advance(self._history.copy(), count.final + 1, at)
+        self._advance(self._history.copy(), len(self._updates))
 
     def _finish(self, late: int = 0) -> None:
         """Judge samples whose estimates no wave to come moves; up to `late` complete ones wait."""
-        count = self._count
-        final = count.taken - 1 - max(self._ahead - 1, 0)
-        if count.taken > self._begins and final > count.final + self._is_exact() * late:
-            self._find_rows(final, self._known_inputs())
-            self._advance(self._history, count.final + 1, final, is_final=True)
-            count.final = final
+        final = len(self._updates) - max(self._ahead - 1, 0)
+        if final > self._is_exact() * late:
+            self._find_rows(self._pending + final - 1, self._known_inputs())
+            self._advance(self._history, final, is_final=True)
+            del self._updates[:final]
 
     def _is_exact(self) -> bool:
         """Whether all samples whose estimates are not final are taken as they are."""
-        return not any(self._pending())
+        return not any(self._updates)
 
-    def _update_of(self, at: int) -> _Update | None:
-        return self._updates[at - self._count.taken]
+    @property
+    def _pending(self) -> int:
+        """Number of the first sample whose estimate is not final."""
+        return self._count.taken - len(self._updates)
 
-    def _advance(
-        self, history: FloatArray, first: int, last: int, *, is_final: bool = False
-    ) -> None:
-        """Run the mean through samples, with the gains that were found for them.
+    def _advance(self, history: FloatArray, count: int, *, is_final: bool = False) -> None:
+        """Run the mean through the next samples, with the gains that were found for them.
 
         Rows of several final ones were read where the vessel was measured.
         """
         s = self.signature.state_delays
-        for at in range(first, last + 1):
-            update, measured = self._update_of(at), self._row("y", at)
+        for at, update in enumerate(self._updates[:count], start=self._pending):
+            measured = self._row("y", at)
             predicted = self.signature.state_scale.centre
             if at >= self._begins:
                 if not is_final:
@@ -693,7 +687,7 @@ class Live:
     def _find_rows(self, stop: int, known: FloatArray) -> None:
         """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
         signature, begins = self.signature, self._begins
-        first = self._count.final
+        first = self._pending - 1
         if first < begins:  # no row was wanted yet
             first = begins - 1 - signature.input_delays
         if stop <= first:
@@ -903,40 +897,24 @@ class Live:
         noises = dict(zip(self.signature.states, self._noise.tolist(), strict=True))
         words = {
             "counts": asdict(self._count),
-            "as_it_is": [each is None for each in self._pending()],
+            "as_it_is": [each is None for each in self._updates],
             "time": self._time,
             "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
             "noise": {name: each for name, each in noises.items() if each},
             "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
-        # Of a covariance, a triangle, or nothing where it follows from the count of samples. Most
-        # is zero where sensors are exact: which numbers are not, and these.
-        lower = np.tril(self._filter.covariance) * self._count.partly
-        values = np.concatenate([each.ravel() for each in [*self._parts(), lower]])
-        bits = np.packbits(values != 0)
-        bits.resize(-4 * (-bits.size // 4))
-        whole = np.concatenate([bits.view(np.uint32), values[values != 0]])
-        return write_sealed(xr.Dataset({"values": ("number", whole)}, attrs=attrs), path, STATE)
-
-    def _pending(self) -> list[_Update | None]:
-        """Updates of the samples whose estimates are not final."""
-        return [self._update_of(at) for at in range(self._count.final + 1, self._count.taken)]
+        values = np.concatenate([each.ravel() for each in self._parts()])
+        return write_sealed(xr.Dataset({"values": ("number", values)}, attrs=attrs), path, STATE)
 
     def _parts(self) -> list[FloatArray]:
         """Views of all that samples and forecasts to come read."""
-        taken, signature = self._count.taken, self.signature
-        taps = 0 if self._follows is None else self._follows.place.taps.size
-        longest = max(signature.state_delays, signature.input_delays, taps)
-        tail = max(taken - (self._ahead + LATE + longest + 4), 0)
-        rows = [self._rows(each, tail, taken) for each in ("y", "delayed", "direct")]
-        rows.append(self._rows("x", max(tail - len(self.errors.rms), self._first), taken))
-        updates = filter(None, self._pending())
-        state = [self._history, self._free, self._innovation, self._squares]
-        state += [self._known_inputs(), self._known_inputs("lost"), self._jumps.memory]
-        if self._surge is not None:
-            state.append(self._surge)
-        return [*rows, *(each for update in updates for each in update), *state]
+        parts = [self._known_inputs(name) for name in self._recent]
+        parts += [each for update in self._updates if update for each in update]
+        parts += [self._history, self._free, self._innovation, self._squares, self._jumps.memory]
+        if self._count.since:  # or it is zero
+            parts.append(self._filter.covariance)
+        return parts
 
     @cached_property
     def _identity(self) -> str:
@@ -950,22 +928,14 @@ class Live:
         """Restore what :meth:`save` wrote."""
         self._count, self._time = _Counts(**content["counts"]), content["time"]
         self._first = max(self._count.taken - self._record, 0)
-        covariance, count = self._filter.covariance, len(self.signature.states)
+        blank = np.empty((self._history.size, len(self.signature.states)))
         for as_it_is in content["as_it_is"]:
-            blank = _Update(np.empty((len(covariance), count)), np.empty(count))
-            self._updates.append(None if as_it_is else blank)
-        parts = [*self._parts(), covariance]
-        *ends, size = np.cumsum([part.size for part in parts]).tolist()
-        head = -(-size // 32)
-        bits, whole = values[:head].astype(np.uint32), np.zeros(size)
-        whole[np.unpackbits(bits.view(np.uint8), count=size) > 0] = values[head:]
-        for part, own in zip(parts, np.split(whole, ends), strict=True):
+            update = _Update(blank.copy(), np.empty(blank.shape[1]))
+            self._updates.append(None if as_it_is else update)
+        parts = self._parts()
+        ends = np.cumsum([part.size for part in parts])
+        for part, own in zip(parts, np.split(values, ends[:-1]), strict=True):
             part[:] = own.reshape(part.shape)
-        covariance += np.tril(covariance, -1).T
-        taken, unseen = self._count.taken, self._count.since
-        if not self._count.partly:
-            for since in range(unseen):
-                self._predict_covariance(taken - unseen + since, since, blind=True)
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
