@@ -795,7 +795,8 @@ class Live:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
             given = np.arange(count) <= known - self._ahead
-            table[0], spread, weight = weighed(complete, errors, scale, given)
+            before = np.abs(history - scale.centre).max(axis=0)
+            table[0], spread, weight = weighed(complete, errors, scale, given, before)
             if unseen > leads:
                 table[0], weight = scale.centre, np.zeros_like(weight)
             # The error passes over with the mean, to that of the mean of training.
