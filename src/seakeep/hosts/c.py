@@ -10,18 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
-from seakeep.conventions import is_elevation
 from seakeep.core.readouts import SOFT
 from seakeep.files import MARK, check_output, make_folder, templates, version, write_text
 from seakeep.hosts.program import exportable
-from seakeep.models import HankelDMDcModel, Model
+from seakeep.models import HankelDMDcModel, Model, validity
 from seakeep.models.engine import GROWTH, fading
 from seakeep.models.growth import DOUBTED
 from seakeep.models.live import AFTER, Live
 from seakeep.models.terms import SlowSquare, Term
-from seakeep.models.validity import CYCLES, PER_OCTAVE, TRAINED
+from seakeep.signals import prediction
 from seakeep.signals.expressions import Text
-from seakeep.signals.prediction import FEWEST, JUMP, MEMORY, NOISE, OF_LATE
 from seakeep.waves import GRAVITY
 
 KIND = "C source"
@@ -136,7 +134,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
         "lines": ()
         if follows is None
         else [
-            (each.load, *follows.lines(None, (each.load.place,)))
+            (each.load, follows.lines(None, (each.load.place,)))
             for each in signature.readouts
             if each.load
         ],
@@ -144,20 +142,11 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     files = {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
     if live:
         content |= live.equations | {
-            "begins": model.history_samples,
-            "memory": MEMORY,
+            "prediction": prediction,
+            "validity": validity,
             "pi": math.pi,
-            "coverage": model.coverage,
-            "trained": TRAINED,
-            "cycles": CYCLES,
             "gravity": GRAVITY,
-            "per_octave": PER_OCTAVE,
-            "is_elevation": is_elevation,
-            "noise_part": NOISE,
             "after": AFTER,
-            "jump": JUMP,
-            "of_late": float(OF_LATE),
-            "fewest": FEWEST,
             "doubted": DOUBTED,
         }
         for end in ("h", "c"):

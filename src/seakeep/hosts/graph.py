@@ -210,9 +210,9 @@ def _model(model: HankelDMDcModel, steps: int) -> Any:
             wave = None
             if each.load:  # elevation and rate at the line, (steps, 2)
                 assert follows
-                taps, probes = follows.lines(None, (each.load.place,))
+                taps = follows.lines(None, (each.load.place,))
                 samples = signature.input_history + np.arange(steps)
-                wave = _carried(u, samples, follows, taps, probes)
+                wave = _carried(u, samples, follows, taps, follows.placed)
             columns[each.column] = each.read(x, wave).reshape(steps, 1)
     graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]

@@ -161,17 +161,15 @@ class Following:
         """
         return _banks(self, self.alignment.rig(run))
 
-    def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
-        """Filters that predict placed elevations from themselves and those up-wave, in a rig.
+    def foresight(self, run: xr.Dataset | None, count: int) -> FloatArray:
+        """Filters that predict :attr:`placed` elevations from themselves and those up-wave.
 
         Returns
         -------
-        taps : ndarray, shape (count, probe, probe, back + 1)
-            Of each of the next samples and of each probe; oldest sample first.
-        placed : tuple of int
-            Elevations at stated positions, by their places among the inputs.
+        ndarray, shape (count, probe, probe, back + 1)
+            Of each of the next samples and of each probe, in the rig of a run; oldest sample first.
         """
-        rig, placed = self.alignment.rig(run), self._placed
+        rig, placed = self.alignment.rig(run), self.placed
         at = [rig.positions[column] or 0.0 for column in placed]
         taps = np.zeros((count, len(at), len(at), self.back + 1))
         for probe, place in enumerate(at):
@@ -180,11 +178,9 @@ class Following:
             columns, leads = [placed[k] for k in read], np.arange(1, count + 1)
             own, _ = self._carriers(rig, columns, np.full(count, place), 0, leads)
             taps[:, probe, read] = own
-        return taps, placed
+        return taps
 
-    def lines(
-        self, run: xr.Dataset | None, places: tuple[float, ...]
-    ) -> tuple[FloatArray, tuple[int, ...]]:
+    def lines(self, run: xr.Dataset | None, places: tuple[float, ...]) -> FloatArray:
         """Filters that read the wave at places in the rig of a run, an instant after their row.
 
         Parameters
@@ -196,15 +192,14 @@ class Following:
 
         Returns
         -------
-        taps : ndarray, shape (2 places, probe, back + ahead + 1)
-            Elevation and rate at each place; oldest sample first.
-        placed : tuple of int
-            Probes that are read, by their places among the inputs.
+        ndarray, shape (2 places, probe, back + ahead + 1)
+            Elevation and rate at each place, read from the :attr:`placed` probes; oldest sample
+            first.
         """
         return _lines(self, self.alignment.rig(run), places)
 
     @property
-    def _placed(self) -> tuple[int, ...]:
+    def placed(self) -> tuple[int, ...]:
         """Elevations at stated positions, or the first, by their places among the inputs."""
         return self.alignment.placed or tuple(np.flatnonzero(self.alignment.carried).tolist()[:1])
 
@@ -271,17 +266,15 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
 
 
 @lru_cache(maxsize=16)
-def _lines(
-    following: Following, rig: Rig, places: tuple[float, ...]
-) -> tuple[FloatArray, tuple[int, ...]]:
+def _lines(following: Following, rig: Rig, places: tuple[float, ...]) -> FloatArray:
     """Filters of :meth:`Following.lines`."""
-    placed, leads = following._placed, np.tile([0, 1, 2], len(places))
+    placed, leads = following.placed, np.tile([0, 1, 2], len(places))
     last = max(placed, key=lambda column: rig.positions[column] or 0.0)
     targets = np.repeat(places, 3) + rig.offsets[last] + (rig.positions[last] or 0.0)
     taps, _ = following._carriers(rig, placed, targets, following.ahead, leads)
     before, now, after = taps.reshape(len(places), 3, *taps.shape[1:]).swapaxes(0, 1)
     filters = np.stack([now, (after - before) / (2.0 * following.dt)], axis=1)
-    return filters.reshape(-1, *taps.shape[1:]), placed
+    return filters.reshape(-1, *taps.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -283,10 +283,11 @@ class Drive:
         """
         follows = self.input_map.follows
         assert follows is not None
-        taps, columns = follows.lines(self.run, places)
         begin = first - follows.back - self.first
-        values = self.values[begin : stop + follows.ahead - self.first, columns]
-        return carried(taps, values).reshape(stop - first, len(places), 2)
+        values = self.values[begin : stop + follows.ahead - self.first, follows.placed]
+        return carried(follows.lines(self.run, places), values).reshape(
+            stop - first, len(places), 2
+        )
 
     def places(self, first: int, stop: int) -> FloatArray:
         """Place of the vessel by its measured surge; at rest in the mean without one."""

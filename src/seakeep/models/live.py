@@ -233,7 +233,7 @@ class Live:
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict each probe from those up-wave too; rows at all places of the samples to come.
         self._table = (0, np.empty(0))
-        self._foresight: tuple[FloatArray, tuple[int, ...]] | None = None
+        self._foresight = np.empty(0)
         if self._follows is not None:
             self._banks = self._follows.banks(self._rig)
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
@@ -519,9 +519,9 @@ class Live:
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
         out, waves = np.repeat(known[-1:], count, axis=0), self._waves
-        if self._foresight is not None and self.ready:
-            taps, placed = self._foresight
-            means = self.signature.input_scale.mean[list(placed)]
+        if self._follows is not None and self.ready:
+            taps, placed = self._foresight, list(self._follows.placed)
+            means = self.signature.input_scale.mean[placed]
             last = known[len(known) - taps.shape[3] :, placed] - means
             out[:, placed] = np.einsum("cqpt,tp->cq", taps[:count], last) + means
             waves = [each for each in waves if each not in placed]

@@ -1,4 +1,5 @@
 {% from "facts.jinja" import N, Q, z, signature, past, upper, follows, late, fore, lead_samples, array with context %}
+{% set coverage = model.coverage %}
 /* {{ mark }} C source; see {{ name }}_estimator.h */
 #include "{{ name }}_estimator.h"
 
@@ -18,7 +19,7 @@ enum {
     X_ROWS = {{ upper }}_ESTIMATES,
     LATE = {{ late }},                  /* samples whose estimates waves to come still move */
     RECORD = {{ upper }}_RECORD,
-    BEGINS = {{ begins }},      /* samples before the first prediction */
+    BEGINS = {{ model.history_samples }},      /* samples before the first prediction */
     LEADS = {{ errors | length }},
     SETTLED = LEADS + OLD / N,  /* samples without a measurement after which errors stay as they are */
     FORE = {{ fore }},                  /* inputs that are predicted before each is from its own record */
@@ -44,20 +45,20 @@ enum {
 /* Inputs that are predicted; the others stay at their last value. */
 static const int waves[] = { {% for q in range(Q) %}{{ 1 if q in waves else 0 }}, {% endfor %}0 };
 static const int wave[] = { {% for q in waves %}{{ q }}, {% endfor %}0 };
-{% if foresight %}
+{% if follows %}
 /* Weights that predict placed probes from themselves and those up-wave: row, probe, probe, sample, oldest first. */
-{{ array("foresight", foresight[0]) -}}
+{{ array("foresight", foresight) -}}
 {{ array("input_mean", means) }}
-static const int placed[] = { {{ foresight[1] | join(", ") }} };
-enum { PLACED = {{ foresight[1] | length }}, TAPS = {{ foresight[0].shape[3] }} };
+static const int placed[] = { {{ follows.placed | join(", ") }} };
+enum { PLACED = {{ follows.placed | length }}, TAPS = {{ foresight.shape[3] }} };
 
 {% endif %}
 /* Waves of training: shares of energy by band, heights and steepnesses. */
 {{ array("shares", coverage.shares) -}}
 {{ array("heights", coverage.heights) -}}
 {{ array("steepnesses", coverage.steepnesses) }}
-static const int elevations[] = { {% for each in signature.inputs %}{{ 1 if is_elevation(each) else 0 }}, {% endfor %}0 };
-#define TRAINED {{ trained | hex }}
+static const int elevations[] = { {% for each in coverage.elevations %}{{ 1 if each else 0 }}, {% endfor %}0 };
+#define TRAINED {{ validity.TRAINED | hex }}
 enum { BANDS = {{ coverage.shares.shape[1] }} };
 
 #define P(i, j) e->covariance[(i) * M + (j)]
@@ -207,7 +208,7 @@ static void identify({{ name }}_estimator *e, int q, int rows)
         square += backward[t] * backward[t];
     }
     if (most > least)
-        order = (int)rint({{ memory }} / fmax(median_frequency(backward, size), 1.0 / size));
+        order = (int)rint({{ prediction.MEMORY }} / fmax(median_frequency(backward, size), 1.0 / size));
     order = order > size / 3 ? size / 3 : order;
     order = order < 1 ? 1 : order;
     e->mean[q] = mean;
@@ -226,7 +227,7 @@ static void identify({{ name }}_estimator *e, int q, int rows)
         }
         if (power <= DBL_EPSILON * square)
             break;
-        reflection = -2.0 * both / (power + 2.0 * {{ noise_part | hex }} * square / size * left);
+        reflection = -2.0 * both / (power + 2.0 * {{ prediction.NOISE | hex }} * square / size * left);
         part *= 1.0 - reflection * reflection;
         for (int t = 0; t < left; t++) {
             double ahead = forward[t] + reflection * backward[t];
@@ -257,7 +258,7 @@ static void expect({{ name }}_estimator *e, int rows)
 {
     double *out = input(e, -1);
     for (int q = 0; q < Q; q++) {
-{% if foresight %}
+{% if follows %}
         int place = 0;
         while (place < PLACED && placed[place] != q)
             place++;
@@ -379,11 +380,11 @@ static void smooth({{ name }}_estimator *e, double *sample)
         away -= x[1] * (a * c) / ((a - b) * (c - b)) + x[2] * (a * b) / ((a - c) * (b - c));
         away = fabs(6.0 / (a * b * c) * away);
         usual = fmax(sqrt(e->squares[i] / fmax(e->weight[i], 1.0)), smoothest[i]);
-        jumps = away > {{ jump | hex }} * usual && e->weight[i] >= {{ fewest }};
+        jumps = away > {{ prediction.JUMP | hex }} * usual && e->weight[i] >= {{ prediction.FEWEST }};
         if ((c == 3.0 || jumps) && !isnan(sample[i]) && !isinf(smoothest[i])) {
-            e->squares[i] *= 1.0 - 1.0 / {{ of_late }};
-            e->weight[i] *= 1.0 - 1.0 / {{ of_late }};
-            e->squares[i] += pow(fmin(away, {{ (0.5 * jump) | hex }} * usual), 2.0);
+            e->squares[i] *= 1.0 - 1.0 / {{ prediction.OF_LATE | float }};
+            e->weight[i] *= 1.0 - 1.0 / {{ prediction.OF_LATE | float }};
+            e->squares[i] += pow(fmin(away, {{ (0.5 * prediction.JUMP) | hex }} * usual), 2.0);
             e->weight[i] += 1.0;
         }
         if (jumps) {
@@ -589,7 +590,7 @@ int {{ name }}_validity({{ name }}_estimator *e)
         steepness = {{ (2 * pi / gravity) | hex }} * height * grown * grown;
         spectrum(e, q, mean, 1, e->forward);
         for (int k = 1; k <= size / 2; k++) {
-            int band = (int)floor({{ per_octave }} * log2(k / (size * {{ upper }}_STEP))) - ({{ coverage.first }});
+            int band = (int)floor({{ validity.PER_OCTAVE }} * log2(k / (size * {{ upper }}_STEP))) - ({{ coverage.first }});
             if (band >= 0 && band < BANDS)
                 energy[band] += e->forward[k];
         }
@@ -601,8 +602,8 @@ int {{ name }}_validity({{ name }}_estimator *e)
             peak = energy[band] > energy[peak] ? band : peak;
             moves = moves || taught[band] >= TRAINED;
         }
-        repeats = size * {{ upper }}_STEP * pow(2.0, ({{ coverage.first }} + peak + 0.5) / {{ per_octave }});
-        if (!moves || !(total > 0.0) || !(repeats > {{ cycles }}))
+        repeats = size * {{ upper }}_STEP * pow(2.0, ({{ coverage.first }} + peak + 0.5) / {{ validity.PER_OCTAVE }});
+        if (!moves || !(total > 0.0) || !(repeats > {{ validity.CYCLES }}))
             continue;
         margin = 1.1 + 1.7 / sqrt(repeats);
         if (unseen > 0.5 * total)
@@ -729,7 +730,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
     int runs = known < n - 1 + {{ lead_samples }} ? RUNS : 1;
     if (runs > 1) {
         expect(e, FORE);
-{% if foresight %}
+{% if follows %}
         for (int p = 0; p < PLACED; p++)
             identify(e, placed[p], FORE);
 {% endif %}

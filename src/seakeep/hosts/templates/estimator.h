@@ -85,7 +85,7 @@ int {{ name }}_validity({{ name }}_estimator *e);
  * other inputs stay at their last value. Where the standard deviation of the errors comes near
  * that of the training, x tends to the mean there. `std` takes these deviations, as x, or is NULL;
  * they are those in data like the training.
- * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if a run is lost, as a step is. */
+ * Returns 0; 1 if there are fewer than {{ model.history_samples }} samples; 2 if a run is lost, as a step is. */
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std);
 
 #ifdef __cplusplus

@@ -269,7 +269,7 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
     for (int i = 0; lost && i < N; i++)
         x[i] = m->regressors[i] = NAN;
     memcpy(m->x, x, sizeof x);
-{% for map, taps, probes in lines %}
+{% for map, taps in lines %}
     {
 {% for name in ("mean", "std", "low", "high", "knots", "weights") %}
         static const double {{ name }}[] = {
@@ -279,14 +279,14 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
         static const double taps[] = {
 {{ taps | numbers }}
         };
-        static const int columns[] = { {{ map.columns | join(", ") }} }, probes[] = { {{ probes | join(", ") }} };
+        static const int columns[] = { {{ map.columns | join(", ") }} }, probes[] = { {{ follows.placed | join(", ") }} };
         static const load_map line = {
             {{ map.column }}, {{ map.columns | length }}, columns, mean, std, low, high, knots, weights
         };
         const double *first = m->inputs + (NOW - BACK) * Q;
         if (!lost)
-            m->x[{{ map.column }}] = load(&line, x, carried(first, taps, 0, {{ probes | length }}, probes),
-                                carried(first, taps, 1, {{ probes | length }}, probes),
+            m->x[{{ map.column }}] = load(&line, x, carried(first, taps, 0, {{ follows.placed | length }}, probes),
+                                carried(first, taps, 1, {{ follows.placed | length }}, probes),
                                 {{ map.span[0] | hex }}, {{ map.span[1] | hex }});
     }
 {% endfor %}
