@@ -131,12 +131,10 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
         "fade": fading(signature),
         "soft": SOFT,
         "readouts": [each for each in signature.readouts if each.acts],
-        "lines": ()
-        if follows is None
-        else [
+        "lines": [
             (each.load, follows.lines(None, (each.load.place,)))
             for each in signature.readouts
-            if each.load
+            if follows and each.load
         ],
     }
     files = {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}

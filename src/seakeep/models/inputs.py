@@ -285,9 +285,8 @@ class Drive:
         assert follows is not None
         begin = first - follows.back - self.first
         values = self.values[begin : stop + follows.ahead - self.first, follows.placed]
-        return carried(follows.lines(self.run, places), values).reshape(
-            stop - first, len(places), 2
-        )
+        read = carried(follows.lines(self.run, places), values)
+        return read.reshape(stop - first, len(places), 2)
 
     def places(self, first: int, stop: int) -> FloatArray:
         """Place of the vessel by its measured surge; at rest in the mean without one."""

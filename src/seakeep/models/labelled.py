@@ -280,11 +280,8 @@ def common_labels(runs: Datasets, names: Sequence[str]) -> tuple[ChannelLabel, .
     """
     for name, run in runs.items():
         check_channels(run, names, name)
-    labels = channel_labels(next(iter(runs.values())), names)
-    if len(runs) == 1:
-        return labels
     out = []
-    for label in labels:
+    for label in channel_labels(next(iter(runs.values())), names):
         stated = {
             name: str(units)
             for name, run in runs.items()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -233,7 +233,7 @@ class Live:
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict each probe from those up-wave too; rows at all places of the samples to come.
         self._table = (0, np.empty(0))
-        self._foresight = np.empty(0)
+        self._foresight: FloatArray = np.empty(0)
         if self._follows is not None:
             self._banks = self._follows.banks(self._rig)
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
@@ -1000,11 +1000,10 @@ def _mean_predictor(
     Physical units; blocks of a and b are oldest first.
     """
 
-    def groups(of: Signature) -> list[tuple[int, Scale]]:
-        delays = of.state_delays, of.input_delays, 0
-        return list(zip(delays, (of.state_scale, of.input_scale, of.direct_scale), strict=True))
+    def groups(of: Signature) -> Iterator[tuple[int, Scale]]:
+        return zip((of.state_delays, of.input_delays, 0), of.scales, strict=True)
 
-    count = len(signature.states)
+    count = len(signature.states)  # newest first, as members have them
     out = [np.zeros((count, delays + 1, of.mean.size)) for delays, of in groups(signature)]
     offset = np.zeros(count)
     for member in members:
@@ -1015,9 +1014,9 @@ def _mean_predictor(
             columns = member.coefficients[:count, first:stop].reshape(count, delays + 1, -1)
             physical = columns * own.std[:, None, None] / of.std
             offset -= np.einsum("nlc,c->n", physical, of.mean)
-            whole[:, whole.shape[1] - delays - 1 :] += physical[:, ::-1]
+            whole[:, : delays + 1] += physical
             first = stop
-    a, b, d = (each.reshape(count, -1) / len(members) for each in out)
+    a, b, d = (each[:, ::-1].reshape(count, -1) / len(members) for each in out)
     return offset / len(members), a, b, d
 
 
