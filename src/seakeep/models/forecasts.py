@@ -705,31 +705,23 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     array([2., 3.])
     """
     level = fraction(level, "level")
-    outer = ["member", *(["window"] if "window" in forecast.dims else [])]
+    windows = forecast if "window" in forecast.dims else forecast.expand_dims("window")
     channels = {
-        name: variable.transpose(*outer, ...)
-        for name, variable in forecast.data_vars.items()
+        name: variable.transpose("member", "window", ...)
+        for name, variable in windows.data_vars.items()
         if "member" in variable.dims and variable.dtype.kind in "iuf"
     }
-    members, windows = forecast.sizes["member"], forecast.sizes.get("window", 1)
-    lost, variables = np.zeros((members, windows), dtype=bool), {}
+    lost, variables = np.zeros((forecast.sizes["member"], windows.sizes["window"]), bool), {}
     for each in channels.values():
-        lost |= np.isnan(each.values.reshape(members, windows, -1)).any(axis=2)
+        lost |= np.isnan(each.values).any(axis=tuple(range(2, each.ndim)))
     for name, each in channels.items():
-        shape = each.shape[len(outer) :]
-        series = each.values.reshape(members, windows, -1, 1)
+        series = each.values.reshape(*lost.shape, -1, 1)
         values = reduce_members(series, np.where(lost, 0, -1), level)
-        values = values.reshape(*each.shape[1 : len(outer)], len(STATISTICS), *shape)
-        dims = (*outer[1:], "statistic", *each.dims[len(outer) :])
-        variables[name] = xr.Variable(dims, values, each.attrs)
-    dropped = int(lost.sum())
-    coords: Mapping[str, object] = {
-        str(name): coordinate
-        for name, coordinate in forecast.coords.items()
-        if "member" not in coordinate.dims
-    }
-    return xr.Dataset(
-        variables,
-        coords={**coords, "statistic": statistic_coordinate(level)},
-        attrs={**forecast.attrs, "level": level, "members": members, "diverged": dropped},
-    )
+        values = values.reshape(lost.shape[1], len(STATISTICS), *each.shape[2:])
+        variables[name] = xr.Variable(("window", "statistic", *each.dims[2:]), values, each.attrs)
+    attrs = {"level": level, "members": len(lost), "diverged": int(lost.sum())}
+    coords = forecast.drop_dims("member").coords
+    summary = xr.Dataset(variables, coords, {**forecast.attrs, **attrs})
+    summary = summary.assign_coords(statistic=statistic_coordinate(level))
+    alone = {} if "window" in forecast.dims else {"window": 0}
+    return summary.isel(alone, missing_dims="ignore")

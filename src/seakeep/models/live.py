@@ -242,10 +242,15 @@ class Live:
         self._begins = signature.history_samples
         needed = 2 * (self._begins + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
-        delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         inputs, self._first, room = len(signature.inputs), 0, 2 * self._record
-        widths = {"u": inputs, "lost": inputs, "x": count, "y": count}
-        widths |= {"delayed": delayed, "direct": direct}
+        widths = {
+            "u": inputs,
+            "lost": inputs,
+            "x": count,
+            "y": count,
+            "delayed": signature.input_scale.mean.size,
+            "direct": signature.direct_scale.mean.size,
+        }
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
         self._jumps, self._jumped = Jumps(self._smoothest()), np.zeros(inputs + count, bool)
