@@ -117,22 +117,18 @@ def observables(signature: Signature) -> dict[str, Any]:
                 taps = enumerate(term.kernel[::-1].tolist(), start=-half)
                 second.append({(newest - shift - at, len(direct)): each for at, each in taps})
             direct.append(f"p({len(first)})^2")
-    filters = {"Filter": _shifted(first, count), "Slow": _shifted(second, len(direct))}
     return {
         "Function": f"@(p) [{'; '.join(delayed + direct)}]",
         "Delayed": len(delayed),
         "Top": np.array(observed.tops)[:, None],
         "Slope": observed.slopes[:, None],
-        **{
-            f"{name}{part}": each
-            for name, filter_parts in filters.items()
-            for part, each in filter_parts.items()
-        },
+        **_shifted("Filter", first, count),
+        **_shifted("Slow", second, len(direct)),
         "Regressors": REGRESSORS,
     }
 
 
-def _shifted(rows: list[dict[tuple[int, int], float]], inputs: int) -> dict[str, Any]:
+def _shifted(name: str, rows: list[dict[tuple[int, int], float]], inputs: int) -> dict[str, Any]:
     """State space of sums over the last samples: weights by (sample back, input) of each output."""
     length = max((back for row in rows for back, _ in row), default=0)
     weights = np.zeros((len(rows), length + 1, inputs))
@@ -141,10 +137,10 @@ def _shifted(rows: list[dict[tuple[int, int], float]], inputs: int) -> dict[str,
             row[at] = weight
     size = length * inputs
     return {
-        "A": sparse.eye_array(size, k=-min(inputs, size), format="csc"),
-        "B": sparse.eye_array(size, inputs, format="csc"),
-        "C": weights[:, 1:].reshape(len(rows), size),
-        "D": weights[:, 0],
+        f"{name}A": sparse.eye_array(size, k=-min(inputs, size), format="csc"),
+        f"{name}B": sparse.eye_array(size, inputs, format="csc"),
+        f"{name}C": weights[:, 1:].reshape(len(rows), size),
+        f"{name}D": weights[:, 0],
     }
 
 
@@ -229,17 +225,13 @@ def to_mat(
             "ErrorBound": bound,
             "StateName": _cell([f"balanced {i + 1}" for i in range(order)]),
         }
-    A, B, C, D = system
     labels = [
         each for group in signature.input_map.regressors(signature.input_labels) for each in group
     ]
     means = [signature.input_scale.mean, signature.direct_scale.mean]
     observed = signature.input_map.observed is not None
     content = {
-        "A": A,
-        "B": B,
-        "C": C,
-        "D": D,
+        **dict(zip("ABCD", system, strict=True)),
         "Ts": signature.dt,
         "Lead": signature.lead_samples,
         "InputOffset": np.concatenate(means)[:, None],

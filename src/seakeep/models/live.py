@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, partial
+from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -370,7 +371,7 @@ class Live:
     def jumped(self) -> tuple[str, ...]:
         """Channels whose last sample was taken as lost, as no wave or motion jumps so far."""
         names = self.signature.inputs + self.signature.states
-        return tuple(name for name, yes in zip(names, self._jumped, strict=True) if yes)
+        return tuple(compress(names, self._jumped))
 
     def _smoothest(self) -> FloatArray:
         """RMS of third differences of inputs and states at least; infinite where they may jump."""
@@ -900,13 +901,13 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
-        noises = dict(zip(self.signature.states, self._noise.tolist(), strict=True))
+        noises = zip(self.signature.states, self._noise.tolist(), strict=True)
         words = {
             "counts": asdict(self._count),
             "as_it_is": [each is None for each in self._updates],
             "time": self._time,
             "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
-            "noise": {name: each for name, each in noises.items() if each},
+            "noise": {name: each for name, each in noises if each},
             "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
