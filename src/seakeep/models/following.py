@@ -231,14 +231,15 @@ class Following:
         sound = self.place.grid[np.max([bank.errors for bank in self.banks(None)], axis=0) <= REACH]
         return (float(sound[0]), float(sound[-1])) if sound.size else (0.0, 0.0)
 
-    def describe(self, dt: float) -> list[str]:
+    def describe(self) -> list[str]:
         """Lines of a summary."""
         (low, high), banks = self.reach, self.banks(None)
         known = np.max([bank.errors[self._known] for bank in banks], axis=0)
         return [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
-            f"    carriers    {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s ahead of all "
-            f"probes; they err {known.min():.2g} to {known.max():.2g} SD where training was",
+            f"    carriers    {self.back * self.dt:.3g} s back and {self.ahead * self.dt:.3g} s "
+            f"ahead of all probes; they err {known.min():.2g} to {known.max():.2g} SD where "
+            "training was",
             f"    reach       {low:.3g} to {high:.3g} m of slow surge, where they err less than "
             f"{REACH:g} SD",
         ]

@@ -521,11 +521,10 @@ def check_arrays(
 
     Columns that have names (a pandas DataFrame, a DataArray) are taken by name.
     """
-    whole_number(steps, "steps")
+    count = whole_number(steps, "steps")
     check_choice("ahead", ahead, ("refuse", "predict"))
-    states, inputs, count = signature.states, signature.inputs, int(steps)
-    rows = signature.state_samples
-    z = signature.input_map.history(signature.input_delays)
+    states, inputs = signature.states, signature.inputs
+    rows, z = signature.state_samples, signature.input_history
     meaning = (
         "s + 1" if rows == signature.state_delays + 1 else "the surge before the delayed waves"
     )

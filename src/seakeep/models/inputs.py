@@ -182,11 +182,8 @@ class InputMap:
 
     def describe(self, dt: float) -> list[str]:
         """Lines of a model's summary."""
-        lines = []
-        if self.follows is not None:
-            lines += self.follows.describe(dt)
-        elif self.alignment is not None:
-            lines += self.alignment.describe()
+        carried = self.follows or self.alignment
+        lines = [] if carried is None else carried.describe()
         if self.lead:
             lines.append(
                 f"  lead          {self.lead} samples: a step is driven by waves up to "

@@ -778,7 +778,7 @@ class Live:
         dark = min(unseen, leads, self._count.taken - self._begins)
         taken = self._count.taken - dark
         history = self._rows("x", taken - signature.state_samples, taken)
-        back = signature.input_map.history(signature.input_delays) + 1 + dark
+        back = signature.input_history + 1 + dark
         windows = engine.array_windows(
             signature,
             np.broadcast_to(history, (len(futures), *history.shape)),
