@@ -355,7 +355,7 @@ CHANGES = {
         ("np.minimum(own + self._filter.ahead(count), errors)", "np.minimum(own, errors)", "models/test_live.py::test_a_dead_sensor_is_followed_through_the_others"),
         ("(1.0 - weight) * wider * scale.spread**2", "0.0", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
         ("variance = weight * (spread + wider * errors)", "variance = weight * wider * errors", "models/test_live.py::test_waves_that_are_not_known_widen_the_band"),
-        ("out += self._d @ self._row", "out += 0 * self._d @ self._row", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
+        ("return out + self._d @ self._row", "return out + 0 * self._d @ self._row", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
         ("self._filter.limit(self.errors.at(since + 1) ** 2, exactly=blind)", "self._filter.limit(self.errors.at(since + 1) ** 2)", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
         ("np.abs(history - scale.centre)", "np.abs(scale.centre)", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
         ("weighed(complete, errors, scale, given, before)", "weighed(complete, wider * errors, scale, given, before)", "models/test_live.py::test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known"),

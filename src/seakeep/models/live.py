@@ -657,12 +657,8 @@ class Live:
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
         delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
-        out = self._a @ history.ravel()
-        out += self._offset
-        out += self._b @ delayed.ravel()
-        if self._d.size:
-            out += self._d @ self._row("direct", at)
-        return out
+        out: FloatArray = self._a @ history.ravel() + self._offset + self._b @ delayed.ravel()
+        return out + self._d @ self._row("direct", at)
 
     def _judge(self, at: int, update: _Update | None, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""

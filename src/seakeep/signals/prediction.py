@@ -195,23 +195,22 @@ class Jumps:
         self.memory = np.full((8, least.size), np.nan)
         self.memory[6:] = 0.0
 
+    @np.errstate(over="ignore")
     def of(self, sample: FloatArray) -> BoolArray:
         """Which values of the next sample jump; it holds NaN where there is none."""
         first, second, third, a, b, c, squares, weight = self.memory
         for age in (a, b, c):
             age += 1
-        with np.errstate(over="ignore"):
-            away = sample - first * (b * c) / ((b - a) * (c - a))
-            away -= second * (a * c) / ((a - b) * (c - b)) + third * (a * b) / ((a - c) * (b - c))
-            away = np.abs(6.0 / (a * b * c) * away)
+        away = sample - first * (b * c) / ((b - a) * (c - a))
+        away -= second * (a * c) / ((a - b) * (c - b)) + third * (a * b) / ((a - c) * (b - c))
+        away = np.abs(6.0 / (a * b * c) * away)
         usual = np.maximum(np.sqrt(squares / np.maximum(weight, 1.0)), self.least)
         jumps = (away > JUMP * usual) & (weight >= FEWEST)
         taken = np.isfinite(sample) & ~jumps
         # Jumps count too, but not for all that they are: what has become rougher is soon usual.
         beside = ((c == 3) | jumps) & np.isfinite(sample) & np.isfinite(self.least)
         self.memory[6:] *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
-        with np.errstate(over="ignore"):
-            squares += np.where(beside, np.minimum(away, 0.5 * JUMP * usual) ** 2, 0.0)
+        squares += np.where(beside, np.minimum(away, 0.5 * JUMP * usual) ** 2, 0.0)
         weight += beside
         newer = np.array([sample, first, second, np.zeros(sample.size), a, b])
         self.memory[:6] = np.where(taken, newer, self.memory[:6])
