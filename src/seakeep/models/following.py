@@ -109,12 +109,9 @@ class Following:
                 f"positions]). State them, or read {least} samples ahead or more: lead = "
                 f"{round(0.75 * period)}."
             )
-        records, surges = [], []
-        for name, run in windows.items():
-            channels = [*names, alignment.settings.surge_channel]
-            values = labelled.sound_matrix(run, channels, name)
-            records.append(values[:, :-1])
-            surges.append(values[:, -1])
+        channels = [*names, alignment.settings.surge_channel]
+        tables = [labelled.sound_matrix(run, channels, name) for name, run in windows.items()]
+        records, surges = [each[:, :-1] for each in tables], [each[:, -1] for each in tables]
         highest = alignment.highest_frequency
         omega, power = mean_spectrum(
             records, dt, period * dt, np.inf if highest is None else highest
@@ -130,8 +127,8 @@ class Following:
         low, high = float(every.min()), float(every.max())
         margin = BEYOND * (high - low)
         assert alignment.water_depth is not None
-        peak = wavenumber(omega[[np.argmax(power)]], alignment.water_depth)[0]
-        spacing = 2 * np.pi / float(peak) / PER_WAVE
+        peak = float(wavenumber(omega[np.argmax(power)], alignment.water_depth))
+        spacing = 2 * np.pi / peak / PER_WAVE
         places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
         return cls(
             alignment=alignment,

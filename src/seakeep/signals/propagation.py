@@ -347,13 +347,12 @@ def misplaced_probes(
               for end in pair}  # fmt: skip
     out: dict[tuple[str, ...], Misplaced] = {}
     for a, b in sorted(against, key=lambda pair: separations[pair].spread):
+        probe, other, own = b, a, separations[a, b]
         if a not in backed and b in backed:
-            own = separations[a, b]
             back = replace(own, separation=-own.separation, stated=-own.stated)
-            out.setdefault((a,), Misplaced(a, b, back, certain=True))
-        else:
-            certain = b not in backed and a in backed
-            out.setdefault((b,) if certain else (a, b), Misplaced(b, a, separations[a, b], certain))
+            probe, other, own = a, b, back
+        certain = probe not in backed and other in backed
+        out.setdefault((probe,) if certain else (a, b), Misplaced(probe, other, own, certain))
     return list(out.values())
 
 
