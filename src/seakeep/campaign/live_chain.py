@@ -85,7 +85,6 @@ class LiveChain:
             for key, more in new.items()
         }
         try:
-            self._check_all_send()
             return self._handed_out()
         except SeakeepError:
             self._rows, self._origin, self._given = before
@@ -147,24 +146,27 @@ class LiveChain:
 
     def _handed_out(self) -> xr.Dataset:
         """Model samples that are ready, and no row kept that none needs any more."""
-        if self._origin is None and all(len(self._instants(key)) for key in self._rows):
+        instants = {key: self._instants(key) for key in self._rows}
+        self._check_all_send(instants)
+        columns = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
+        empty = xr.Dataset(columns, coords={"time": np.empty(0)})
+        if not all(map(len, instants.values())):
+            return empty
+        if self._origin is None:
             # As offline: multiples of the step from the first instant of the reference.
-            firsts = [self._instants(key)[0] for key in self._rows]
+            firsts = [each[0] for each in instants.values()]
             self._origin = firsts[0]
             self._given = math.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6)
-        ready = 0
-        if self._origin is not None:
-            newest = min(self._instants(key)[-1] for key in self._rows)
-            ready = math.floor((newest - self.delay - self._origin) / self.dt + 1e-9) + 1
-        if self._origin is None or ready - self._given < self.every:
-            empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
-            return xr.Dataset(empty, coords={"time": np.empty(0)})
+        newest = min(each[-1] for each in instants.values())
+        ready = math.floor((newest - self.delay - self._origin) / self.dt + 1e-9) + 1
+        if ready - self._given < self.every:
+            return empty
         run = self._prepared(self._origin, self._given, ready)
         self._given = ready
         # Rows that have left the window are forgotten.
         oldest = self._origin + ready * self.dt + self.delay - self.window
         for key, table in self._rows.items():
-            first = np.searchsorted(self._instants(key), oldest)
+            first = np.searchsorted(instants[key], oldest)
             self._rows[key] = {name: values[first:] for name, values in table.items()}
         return run
 
@@ -202,9 +204,8 @@ class LiveChain:
         name, factor = self._time[key]
         return self._run.clocks[key].reference(self._rows[key][name] * factor)
 
-    def _check_all_send(self) -> None:
+    def _check_all_send(self, instants: Mapping[str, FloatArray]) -> None:
         """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
-        instants = {key: self._instants(key) for key in self._rows}
         start = min((each[0] for each in instants.values() if each.size), default=0.0)
         newest = {key: each[-1] if each.size else start for key, each in instants.items()}
         last = min(newest, key=newest.__getitem__)

@@ -462,7 +462,8 @@ def contact_sheet(path: Path | str, track: Track) -> bytes:
                     f"{path} has no frame {here['picture']:.0f}: it is not the video that "
                     "was tracked, or was changed since. Track it again."
                 )
-            colour = (60, 200, 60) if here["flag"] == FLAGS["good"] else (40, 40, 240)
+            name = next(key for key, code in FLAGS.items() if code == here["flag"])
+            colour = (60, 200, 60) if name == "good" else (40, 40, 240)
             if np.isfinite(here["centroid_x"]):
                 box = cv2.boxPoints((
                     (here["centroid_x"], here["centroid_y"]),
@@ -471,7 +472,6 @@ def contact_sheet(path: Path | str, track: Track) -> bytes:
                 ))  # fmt: skip
                 cv2.polylines(frame, [np.round(box).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
             small = cv2.resize(frame, (480, round(480 * frame.shape[0] / frame.shape[1])))
-            name = next(key for key, code in FLAGS.items() if code == here["flag"])
             text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
             cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
             cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
