@@ -350,7 +350,6 @@ CHANGES = {
         ("(measured - predicted) / self.errors.at(lead)", "(measured - predicted) / self.errors.at(1)", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
         ("self._squares *= np.where(known, self._fade, 1.0)", "self._squares *= 1.0", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
         ("final = len(self._updates) - max(self._ahead - 1, 0)", "final = len(self._updates)", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
-        ("direct[:, -1] = (places - self._follows.place.centre) ** 2", "direct[:, -1] = places", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
         ("wanted = steps - 1 + self._ahead", "wanted = steps + self._ahead", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
         ("np.minimum(own + self._filter.ahead(count), errors)", "np.minimum(own, errors)", "models/test_live.py::test_a_dead_sensor_is_followed_through_the_others"),
         ("(1.0 - weight) * wider * scale.spread**2", "0.0", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),

@@ -226,8 +226,10 @@ class Drive:
     run: xr.Dataset | None = None
     spans: Sequence[Span] = ()
 
-    def rows(self, first: int, stop: int) -> Regressors:
+    def rows(self, first: int, stop: int, table: FloatArray | None = None) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
+
+        `table` is :meth:`table` of these samples, where it is there already.
 
         Rows are NaN where they need inputs that are not there. Waves of a model that follows its
         surge are those at the measured one; without one, of a vessel at rest in the mean place.
@@ -240,7 +242,8 @@ class Drive:
             values = input_map.with_delayed(self.values[low : end + ahead - input_map.lead])
             return Regressors(values[begin - low : end - low], direct)
         place, here = input_map.follows.place, self.places(first, stop)
-        table = self.table(first, stop)
+        if table is None:
+            table = self.table(first, stop)
         delayed = read_table(place, table, np.arange(stop - first), here)
         squared = (here - place.centre) ** 2
         return Regressors(delayed, np.concatenate([direct, squared[:, None]], axis=1))

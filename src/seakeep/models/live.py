@@ -36,7 +36,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.core.kalman import DelayFilter, process_noise
-from seakeep.core.recursion import read_row, read_table
+from seakeep.core.recursion import read_row
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.executor import one_blas_thread
 from seakeep.files import load_sealed, write_sealed
@@ -700,11 +700,9 @@ class Live:
         if self._follows is not None:
             surge = self._known_inputs("x")[:, self._follows.column]
             drive = Drive(signature.input_map, known, begin, surge, self._banks)
-            table, places = drive.table(first, stop), drive.places(first, stop)
+            table = drive.table(first, stop)
             self._table = (first, table)
-            delayed[:] = read_table(self._follows.place, table, np.arange(stop - first), places)
-            direct[:, :-1] = drive.direct(first, stop)
-            direct[:, -1] = (places - self._follows.place.centre) ** 2
+            delayed[:], direct[:] = drive.rows(first, stop, table)
             return
         # Direct regressors are wanted from the first prediction on.
         span = Span(first, max(first, begins - 1), stop)
