@@ -726,7 +726,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
 {
     double u[Q + 1], apart[Q + 1] = { 0.0 }, row[Q + 1], moved[N] = { 0.0 }, spreads[N] = { 0.0 };
     const double *history = e->x + (X_ROWS - back - {{ upper }}_X_ROWS) * N;
-    double weight[N], before[N] = { 0.0 }, *reach = e->cross;
+    double weight[N], above[N], below[N], *reach = e->cross;
     int runs = known < n - 1 + {{ lead_samples }} ? RUNS : 1;
     if (runs > 1) {
         expect(e, FORE);
@@ -753,8 +753,11 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
         if ({{ name }}_start(&e->models[run], history, e->u_history))
             return 1;
     }
-    for (int k = 0; k < {{ upper }}_X_ROWS * N; k++)
-        before[k % N] = fmax(before[k % N], fabs(history[k] - centre[k % N]));
+    for (int k = 0; k < {{ upper }}_X_ROWS * N; k++) {
+        double away = history[k] - centre[k % N];
+        above[k % N] = k < N ? away : fmin(above[k % N], away);
+        below[k % N] = k < N ? -away : fmin(below[k % N], -away);
+    }
     memcpy(reach, on_states, sizeof on_states);
     for (int i = 0; i < N; i++)
         weight[i] = too_long ? 0.0 : 1.0;
@@ -771,7 +774,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
         }
         for (int i = 0; i < N; i++) {
             double middle = e->models[0].x[i], away = 0.0, variance;
-            double usual = fmax(fmin(fabs(middle - centre[i]), before[i]), spread[i]);
+            double usual = fmax(fmin(fabs(middle - centre[i]), fmax(above[i], below[i])), spread[i]);
             for (int run = 1; run < runs; run += 2) {
                 double more = e->models[run].x[i], less = e->models[run + 1].x[i];
                 moved[i] += 0.5 * (more + less) - middle;
