@@ -32,8 +32,8 @@ FORMAT = 11
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
 SEAL = b"seakeep CRC-32 "
-"""Marker between the content of a NetCDF file and its checksum; HDF5 reads no further. A SHA-256,
-which sealed files before format 9, takes half of the time of reading a large result."""
+"""Marker between the content of a NetCDF file and its checksum; HDF5 reads no further. A SHA-256
+would take half of the time of reading a large result."""
 
 NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 CONTENTS = "seakeep_contents"
@@ -356,10 +356,6 @@ def _seal_of(content: memoryview) -> bytes:
     return SEAL + b"%08x" % zlib.crc32(content)
 
 
-def _seal_before(content: memoryview) -> bytes:
-    return b"seakeep SHA-256 " + hashlib.sha256(content).hexdigest().encode()
-
-
 def read_sealed(path: Path | str) -> io.BytesIO:
     """Content of a file of :func:`write_netcdf`, once its checksum was compared.
 
@@ -384,15 +380,16 @@ def read_sealed(path: Path | str) -> io.BytesIO:
         If its checksum is missing or another one.
     """
     file = read_bytes(path)
-    at = max(file.rfind(b"seakeep ", -len(_seal_before(memoryview(b"")))), 0)
-    content, stated = memoryview(file)[:at], file[at:]
+    size = len(SEAL) + 8
+    content, stated = memoryview(file)[:-size], file[-size:]
     if file and not file.startswith((b"\x89HDF", b"CDF")):
         raise DataError(
             f"{path} is no NetCDF file, as seakeep writes. Name one that it wrote, such as "
             "model.nc of seakeep fit; runs are described by a campaign file."
         )
-    if stated not in (_seal_of(content), *([] if SEAL in stated else [_seal_before(content)])):
-        why = "its checksum is another one" if at else "it has no checksum at its end"
+    if stated != _seal_of(content):
+        sealed = stated.startswith(SEAL)
+        why = "its checksum is another one" if sealed else "it has no checksum at its end"
         raise DataError(
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
