@@ -74,8 +74,7 @@ CHANGES = {
     ],
     "check/residuals.py": [
         ("1.96 / np.sqrt(count)", "1.96 / np.sqrt(count - lags)", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
-        ("inputs = channel_matrix(run, model.inputs, name, after)", "inputs = channel_matrix(run, model.inputs, name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
-        ("rows = starts[:, None] + np.arange(1, count + 1)", "rows = starts[:, None] + np.arange(count)", "check/test_residuals.py::test_bands_and_ages_add_up"),
+        ("name, slice(first + 1, last + 1))", "name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ],
     "check/response.py": [
         ('replace(alignment.settings, surge="measured")', 'replace(alignment.settings, surge="none")', "check/test_response.py::test_measured_phases_count_from_the_waves_where_the_vessel_is"),
@@ -308,6 +307,7 @@ CHANGES = {
         ("enumerate(at) if each <= place]", "enumerate(at)]", "models/test_live.py::test_a_dead_probe_is_filled_by_no_more_than_waves"),
     ],
     "models/forecasts.py": [
+        ("np.stack([states[at + 1 : at + 1 + steps] for at in starts])", "np.stack([states[at : at + steps] for at in starts])", "check/test_free.py::test_free_runs_of_an_ensemble_are_the_mean_of_its_members"),
         ('"diverged_at": lost, ', "", "models/test_stability.py::test_a_forecast_that_diverges_ends_in_nan_with_its_status"),
         ("first = max(len(after) - signature.lead_samples + 1, 0)", "first = 0", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),
     ],

@@ -294,14 +294,6 @@ def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) ->
     return FreeRun(start, time, channel_matrix(forecast, model.states, name), measured)
 
 
-def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
-    """Free runs from several starts, (window, steps, N); for an ensemble the members' mean."""
-    forecasts = model.forecast_windows(run, starts.tolist(), steps)
-    if "member" in forecasts.dims:
-        forecasts = forecasts[model.states].mean("member", skipna=False)
-    return np.stack([forecasts[name].values for name in model.states], axis=-1)
-
-
 def whole_span(run: xr.Dataset, *uses: str) -> tuple[float, float]:
     """Span of a run that has one of the uses, by default training or testing; or all of it."""
     time = run["time"].values
