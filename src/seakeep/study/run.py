@@ -9,7 +9,7 @@ puts those of all units side by side, along models and training sets.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -70,7 +70,6 @@ def run_study(
     progress: Progress | None = None,
     extra: Datasets | None = None,
     notes: Mapping[str, str] | None = None,
-    finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Run a study, or continue one that was stopped.
 
@@ -90,8 +89,6 @@ def run_study(
         Groups to be kept beside the results.
     notes : mapping of str to str, optional
         Attributes to be kept beside them, such as ``preparation_note`` for the report.
-    finished : callable, optional
-        Called with the result once it is known, just before it is written.
 
     Returns
     -------
@@ -141,8 +138,6 @@ def run_study(
                 warn(words_of_lost(groups["statistics/lost"]))
             attributes = {**labels, **_attributes(study, plan), **(notes or {})}
             result = StudyResult(out, attributes, {**groups, **(extra or {})})
-        if finished is not None:
-            finished(result)
         if before is None or before.attrs != result.attrs:
             write_result(result)
         folder.clear()
@@ -191,7 +186,7 @@ def _computed(
     known = {unit: folder.read(unit.name) for unit in units}
     done = {unit: groups for unit, groups in known.items() if groups is not None}
     tasks = tasks_of(plan, [unit for unit in units if unit not in done])
-    members = sum(each.spec.n_members for each in plan.models.values())
+    members = sum(spec.n_members for spec in plan.specs.values())
     steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
     mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
     taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
