@@ -7,7 +7,6 @@ import functools
 import hashlib
 import io
 import json
-import os
 import re
 import secrets
 import shutil
@@ -41,28 +40,6 @@ CONTENTS = "seakeep_contents"
 to find them."""
 SHOWN = 5
 """Names of a folder that a message lists at most."""
-
-
-def existing_file(path: Path | str) -> Path:
-    """Path of a regular file that exists; ``~`` is replaced by the home folder.
-
-    Parameters
-    ----------
-    path : Path or str
-        What the user named.
-
-    Returns
-    -------
-    Path
-        The path.
-
-    Raises
-    ------
-    MissingFileError
-        As :func:`reading`.
-    """
-    with reading(path) as place:
-        return place
 
 
 def is_there(path: Path) -> bool:
@@ -531,8 +508,7 @@ def check_output(
         The file wanted.
     kind : str
         What is written there, such as ``"model"``: a file at `path` must be of the same kind.
-        NetCDF files state it in the attribute :data:`MARK`; others as ``seakeep_file: KIND`` in
-        their first or last kilobytes.
+        NetCDF files state it in the attribute :data:`MARK`; others as ``seakeep_file: KIND``.
     inputs : iterable of Path
         Files that the command reads.
     header : str, optional
@@ -551,16 +527,13 @@ def check_output(
             f"{path} is read by this command and would be overwritten by the {kind}. "
             "Choose another name."
         )
-    with path.open("rb") as file:
-        start = file.read(HEAD)
-        file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
-        both = start + file.read()  # PDF keeps its mark at the end
-    if path.suffix == ".nc" or start.startswith(HDF5):
+    content = path.read_bytes()
+    if path.suffix == ".nc" or content.startswith(HDF5):
         ours = _mark_of_netcdf(path) == kind
     elif path.suffix == ".csv":
-        ours = bool(header and re.match(header, both.decode("utf-8", "replace")))
+        ours = bool(header and re.match(header, content.decode("utf-8", "replace")))
     else:
-        ours = f"{MARK}: {kind}".encode() in both
+        ours = f"{MARK}: {kind}".encode() in content
     if not ours:
         raise RequestError(
             f"{path} exists and is not a {kind} that seakeep wrote; it may be a measurement. "
@@ -590,9 +563,6 @@ def check_report(folder: Path) -> None:
                 "would stand among them. Choose another folder (-o)."
             )
 
-
-HEAD = 65536
-"""Bytes of a file in which its mark is looked for."""
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """First bytes of a NetCDF file, for any suffix."""
