@@ -368,8 +368,9 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
     general = settings.study
     training_names = list(settings.training.runs) or campaign.training_runs
     testing = {name: _test_runs(study, name) for name in settings.tests}
-    wanted = dict.fromkeys([*training_names, *(n for names in testing.values() for n in names)])
-    runs = load_prepared(campaign, names=list(wanted), progress=progress)
+    asked = dict.fromkeys(run for names in testing.values() for run in names)
+    wanted = list(dict.fromkeys(training_names) | asked)
+    runs = load_prepared(campaign, names=wanted, progress=progress)
     for name, run in runs.items():
         _check_channels(name, run, [*study.states, *study.inputs])
     shared, dt = next(iter(runs.values())).attrs, step_of(runs)
@@ -412,12 +413,11 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
                     f"tests.{name}: no model may be tested on the run '{window.run}', because all "
                     "learn from it. Leave it out of training.runs, or name other runs."
                 )
-    asked = {run for names in testing.values() for run in names}
     tested = {window.run for windows in tests.values() for window in windows}
     untested = [
         each.name
         for each in training
-        if asked.intersection(each.left_out) and not any(map(each.may_test, tested))
+        if asked.keys() & each.left_out and not any(map(each.may_test, tested))
     ]
     if untested:
         warn(

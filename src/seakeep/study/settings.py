@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -207,7 +208,7 @@ class StudySettings(Table):
             )
         for group in (self.models, self.tests):
             for name in group:
-                if not name.replace("_", "").replace("-", "").isalnum() or not name.isascii():
+                if not re.fullmatch(r"[\w-]+", name, re.ASCII):
                     raise ValueError(
                         f"the name {name!r} is made of more than letters, digits, '_' and '-', "
                         "and files are named after it; rename it"
