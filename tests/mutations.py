@@ -50,8 +50,8 @@ CHANGES = {
     ],
     "campaign/survey.py": [
         ("self.period / stated.steps_per_period", "self.period / (stated.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
-        ("if each[3] >= FEWEST} or spans", "} or spans", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
-        ("or steady > NOISY * counted", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
+        ("if each[1] >= FEWEST} or counted", "} or counted", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
+        ("or steady > NOISY * period", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
     "check/coherence.py": [
         ("1 if names else len(references) + linear", "len(references) + linear", "check/test_coherence.py::test_observables_lower_the_bound"),

@@ -130,7 +130,7 @@ class Run:
     data : Dataset or None
         All channels on one axis.
     findings : sequence of Finding
-        Results of the checks.
+        Results of the checks; before them, what speaks against its counted period.
     """
 
     name: str
@@ -589,15 +589,13 @@ def cropped(run: Run) -> Run:
     return replace(run, data=data, groups=groups)
 
 
-def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str, str]) -> Run:
+def checked(run: Run, left_out: Mapping[str, str]) -> Run:
     """Step 8: look for faults.
 
     Parameters
     ----------
     run : Run
         The run, on one axis, cut to its span.
-    period : (float, float) or None
-        Counted period and energy period of its waves, s, where they disagree.
     left_out : mapping of str to str
         Runs left out of what is pooled, and why.
     """
@@ -622,8 +620,6 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         span=run.used_span,
         waves=run.own.waves,
         water_depth=settings.rig.water_depth,
-        wave_channel=settings.wave_channel,
-        period=period,
         stated_period=settings.campaign.encounter_period,
         redundant=redundant_pairs(settings, np.nan),
         rates=rates,
@@ -633,7 +629,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         anti_alias=preparation.anti_alias,
         left_out=left_out,
     )
-    return replace(run, findings=check(record))
+    return replace(run, findings=[*check(record), *run.findings])
 
 
 def _part(

@@ -398,7 +398,7 @@ class Campaign:
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
                 run = cropped(resampled(run, dt))
-                run = checked(run, surveyed.doubts.get(name), surveyed.left_out)
+                run = checked(run, surveyed.left_out)
                 warn_of(run.findings, reported)
                 data = run.data
                 data.attrs["quality"] = as_json(run.findings)

@@ -181,12 +181,6 @@ def steps(record: Record) -> Findings:
                 )
 
 
-def periods(record: Record) -> Findings:
-    """A counted period that is not a period of the waves."""
-    if record.period and record.wave_channel:
-        yield record.finding(ClocksKind.PERIOD, record.wave_channel, *record.period, "s")
-
-
 def others(record: Record) -> Findings:
     """Runs left out of the pooled period and clocks."""
     for run, words in record.left_out.items():
