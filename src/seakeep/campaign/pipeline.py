@@ -531,8 +531,7 @@ def _on_axis(run: Run, group: xr.Dataset, wanted: FloatArray, dt: float) -> dict
     if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
         # The last instant may lie a rounding beyond the record.
         clipped = np.clip(wanted, time[0], time[-1])
-        fine = not settings.anti_alias and dt > own
-        series = resample(series, time, clipped, settings.attenuation, anti_alias=not fine)
+        series = resample(series, time, clipped, settings.attenuation, settings.anti_alias)
     else:
         series = series[: wanted.size]
     out = {

@@ -243,16 +243,15 @@ class Campaign:
         for name in wanted:
             self._run(name)
         stated = self.settings.campaign.encounter_period
-        settings = self._in_seconds(stated)
         channel = self.period_channel() if needs_period and not stated else None
-        if channel and not settings.period_runs:
+        if channel and not self.settings.period_runs:
             raise RequestError(
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
+        settings = self._in_seconds(stated)
         surveyed = survey(settings, self.files_of, wanted, channel, progress, failures)
-        period = stated or surveyed.period
-        return replace(surveyed, settings=self._in_seconds(period), period=period)
+        return replace(surveyed, settings=self._in_seconds(surveyed.period))
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.

@@ -168,7 +168,8 @@ def survey(
                 f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
             )
     long = {name: each for name, each in counted.items() if each[1] >= FEWEST} or counted
-    period = float(np.mean([each[0] for each in long.values()])) if long else 0.0
+    measured = float(np.mean([each[0] for each in long.values()])) if long else 0.0
+    period = settings.campaign.encounter_period or measured
     doubts = {name: each[2] for name, each in counted.items()}
     if bad and (not clocks or (period_runs and not counted)):
         raise as_one(bad)

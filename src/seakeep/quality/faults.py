@@ -331,8 +331,6 @@ def reading_step(series: npt.ArrayLike) -> float:
     """
     x = as_series(series)
     change = np.diff(x)
-    if x.size < 3 or not change.any():
-        return np.nan
     frame = _frame(x)
     steps = []
     for begin, end in stretches(change == 0):  # x[begin] to x[end] are equal

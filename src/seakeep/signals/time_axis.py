@@ -328,8 +328,8 @@ def over_gaps(series: FloatArray, there: BoolArray | None = None) -> FloatArray:
     """
     there = np.isfinite(series) if there is None else there
     at = np.flatnonzero(there)
-    if at.size in (0, series.size):
-        return np.where(there, series, 0.0)
+    if not at.size:
+        return np.zeros(series.size)
     return np.interp(np.arange(series.size), at, series[at])
 
 
