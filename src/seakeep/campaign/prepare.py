@@ -23,7 +23,7 @@ from seakeep.quality import as_json, judge_runs, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
-from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
+from seakeep.toml import lengths, parse_length, read_toml, validated
 
 FORMAT = 13
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
@@ -123,10 +123,6 @@ class Campaign:
     def _lengths(self) -> list[tuple[str, ...]]:
         """Places of what counts in encounter periods; models keep theirs, which become samples."""
         return [place for place in lengths(self.settings) if place[0] not in ("model", "models")]
-
-    def _in_seconds(self, period: float | None) -> CampaignSettings:
-        """Settings with what counts in encounter periods turned into seconds and hertz."""
-        return in_seconds(self.settings, period, self._lengths) if period else self.settings
 
     def files_of(self, name: str) -> dict[str, Path]:
         """Paths of a run's files.
@@ -239,7 +235,7 @@ class Campaign:
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
-        """Clocks of the wanted runs, the encounter period if needed, and settings in seconds."""
+        """Clocks of the wanted runs, and the encounter period if needed."""
         for name in wanted:
             self._run(name)
         stated = self.settings.campaign.encounter_period
@@ -249,9 +245,7 @@ class Campaign:
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
-        settings = self._in_seconds(stated)
-        surveyed = survey(settings, self.files_of, wanted, channel, progress, failures)
-        return replace(surveyed, settings=self._in_seconds(surveyed.period))
+        return survey(self.settings, self.files_of, wanted, channel, progress, failures)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -487,7 +481,7 @@ class Campaign:
         }
         whole = (time[0], time[-1])
         for use in ("train", "test"):
-            span = getattr(settings, use)
+            span = run.span(use)
             if not span and settings.serves == use:
                 span = whole
             if span:

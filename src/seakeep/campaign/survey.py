@@ -113,8 +113,13 @@ class Survey:
     def read(self, name: str) -> Run:
         """Steps 1 and 2: a run's files, their clocks known."""
         run = self.kept.pop(name, None) or read(name, self.settings, self.files_of(name))
-        found = self.doubts.get(name, ())
-        return replace(run, settings=self.settings, clocks=self.clocks[name], findings=found)
+        return replace(
+            run,
+            settings=self.settings,
+            period=self.period,
+            clocks=self.clocks[name],
+            findings=self.doubts.get(name, ()),
+        )
 
     def channels(self, name: str) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""
