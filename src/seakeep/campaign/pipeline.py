@@ -620,7 +620,8 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
     for name in run.groups:
         own = settings.instruments[name] if name else settings.files
         if own.sampling_rate:
-            rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
+            is_guess = own.time is None and own.sampling_rate_assumed
+            rates[name] = Rate(own.sampling_rate, is_guess)
     channels = run.channels
     units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
     waves = {

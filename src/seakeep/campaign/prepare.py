@@ -453,7 +453,7 @@ class Campaign:
         changed: dict[str, Any] = {"runs": {**settings.runs, run: whole}}
         if settings.preparation.gaps == "refuse":  # rows get lost in service
             changed["preparation"] = settings.preparation.model_copy(update={"gaps": "mask"})
-        source = replace(surveyed, settings=settings.model_copy(update=changed)).read(run)
+        source = replace(surveyed.read(run), settings=settings.model_copy(update=changed))
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
     def _attributes(self, run: Run, dt: float) -> dict[str, Any]:

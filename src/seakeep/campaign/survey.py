@@ -115,7 +115,6 @@ class Survey:
         run = self.kept.pop(name, None) or read(name, self.settings, self.files_of(name))
         return replace(
             run,
-            settings=self.settings,
             period=self.period,
             clocks=self.clocks[name],
             findings=self.doubts.get(name, ()),

@@ -131,7 +131,7 @@ def rates(record: Record) -> Findings:
         table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
             yield record.finding(ClocksKind.COUNTED, label, table=table)
-        if rate and rate.counted and rate.assumed:
+        if rate and rate.assumed:
             yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 
 

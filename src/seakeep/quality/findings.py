@@ -171,10 +171,9 @@ Redundant = Mapping[tuple[str, ...], float | None]
 
 @dataclass(frozen=True)
 class Rate:
-    """Stated rate of a logger (Hz): whether times are counted with it, whether it is a guess."""
+    """Stated rate of a logger (Hz), and whether it is a guess with which times are counted."""
 
     stated: float
-    counted: bool = True
     assumed: bool = False
 
 
