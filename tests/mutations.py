@@ -433,6 +433,7 @@ CHANGES = {
         ("tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
     ],
     "quality/faults.py": [
+        ("minimum=2 * REACH)", "minimum=2 * REACH + 1)", "quality/test_faults.py::test_sixteen_samples_are_enough_to_be_judged"),
         ("corner > CORNER * distance[begin:end].max()", "True", "quality/test_faults.py::test_a_model_that_is_let_go_swings_back"),
         ("1.0 - weights @ power[1:] / power[0]", "weights @ power[1:] / power[0]", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
         ("(high - low) / 3.29", "(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
