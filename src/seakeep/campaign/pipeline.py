@@ -72,8 +72,14 @@ from seakeep.signals import (
     resample,
     uniform_step,
 )
-from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import inside, instant_text, span_text, stretches, usual_step
+from seakeep.signals.time_axis import (
+    ASSUMED,
+    inside,
+    instant_text,
+    span_text,
+    stretches,
+    usual_step,
+)
 from seakeep.toml import in_seconds
 
 ChannelMap = dict[str, ChannelSettings]
@@ -661,16 +667,17 @@ def _part(
     Refused is also a span that reaches beyond the reference's record by more than a slack.
     """
     dt = usual_step(time)
-    shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
     finite = [edge for edge in span if np.isfinite(edge)]
-    if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
+    outside = any(not record[0] - slack <= edge <= record[1] + slack for edge in finite)
+    used = inside(time, span, dt)
+    if (count := used.sum()) > 1 and not outside:
+        return used
+    shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
+    if outside:
         raise RequestError(
             f"{key}: received {shown}, and the record runs from "
             f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
-    used = inside(time, span, dt)
-    if (count := used.sum()) > 1:
-        return used
     lacks = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
     common = span_text(time[0], time[-1], dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:

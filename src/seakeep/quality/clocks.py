@@ -8,7 +8,7 @@ from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Findings, Kind, Record, sound, step_of
 from seakeep.signals.filters import PASSBAND
-from seakeep.signals.synchronisation import ASSUMED
+from seakeep.signals.time_axis import ASSUMED
 from seakeep.signals.waves import energy_above
 
 RATE_TOLERANCE = 0.01
