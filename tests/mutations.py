@@ -32,7 +32,7 @@ CHANGES = {
     "campaign/guesses.py": [
         ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
         ("noise_share(series) > 0.5", "noise_share(series) > 2", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
-        ('"time" in _kinds(_words(column)) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
+        ('"time" in kinds_of(column) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
     ],
     "campaign/pipeline.py": [
         ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),

@@ -24,10 +24,10 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.campaign.derivation import derive, needed_channels, sources_of
-from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
     counts_samples,
     find_column,
+    is_wave,
     time_column,
     time_step_of,
     times_of,
