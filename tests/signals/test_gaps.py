@@ -21,6 +21,13 @@ def test_gaps_are_told_and_masked():
     assert_array_equal(x[kept], np.sin(t[kept]))
 
 
+def test_rounding_of_times_does_not_add_up_over_a_long_gap():
+    t = np.arange(1800) / 30 + 20 * (np.arange(1800) >= 900)
+    report = inspect_times(np.round(t, 3))
+    assert (report.missing, report.jittered) == (600, False)
+    assert report.step == pytest.approx(1 / 30, rel=1e-6)
+
+
 def test_jitter_is_told_and_interpolated_away():
     rng = np.random.default_rng(0)
     t = 0.02 * np.arange(500) + 0.002 * rng.standard_normal(500)

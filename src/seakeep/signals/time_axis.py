@@ -315,14 +315,11 @@ def inspect_times(time: ArrayLike, name: str = "the run") -> TimeReport:
 
 def _grid(t: FloatArray) -> tuple[IntArray, float, float]:
     """Whole number of steps from the first instant to each, the step, and the grid's start."""
-    usual = usual_step(t)
-    place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(np.diff(t) / usual), 1))])
-    for _ in range(2):  # a usual step that is off by rounding adds up over a long gap
-        step, begin = np.polyfit(place, t, 1)
-        again = np.rint((t - begin) / step)
-        if np.array_equal(again, place) or np.any(np.diff(again) < 1):
-            break
-        place = again - again[0]
+    steps = np.diff(t)
+    # Rounding of the times averages out; in one step it would add up over a long gap.
+    usual = steps[steps < 1.5 * np.median(steps)].mean()
+    place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / usual), 1))])
+    step, begin = np.polyfit(place, t, 1)
     return place.astype(np.int64), float(step), float(begin)
 
 
