@@ -222,17 +222,18 @@ def _tolerance(t: FloatArray, step: float) -> float:
 
 def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
-    usual = np.median(steps)
-    counts = steps / usual
-    gaps = np.flatnonzero(counts > 1.5)
-    if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
+    place, step, _ = _grid(t)
+    counts = np.diff(place)
+    gaps = np.flatnonzero(counts > 1)
+    if gaps.size and np.max(np.abs(steps / step - counts)) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
             f"the times of {name} have {gaps.size} gap(s): after t = {_shown(t, gaps[0])}, "
-            f"{np.rint(counts[gaps[0]]) - 1:.0f} sample(s) of {usual:g} s are missing; the "
+            f"{counts[gaps[0]] - 1} sample(s) of {step:g} s are missing; the "
             f"longest gap, after t = {_shown(t, longest)}, lasts {steps[longest]:g} s. Fill the "
             "gap, or use the record before or after it."
         )
+    usual = np.median(steps)
     at = np.argmax(np.abs(steps - usual))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
