@@ -517,11 +517,10 @@ class CampaignSettings(Table):
                 return min(placed, key=placed.__getitem__), max(placed, key=placed.__getitem__)
         return None
 
-    def all_models(self) -> dict[tuple[str, ...], ModelSettings]:
-        """Models by the place of their table: ``model`` and ``models.NAME``."""
-        models: dict[tuple[str, ...], ModelSettings]
-        models = {("models", name): each for name, each in self.models.items()}
-        return {("model",): self.model, **models} if self.model else models
+    def all_models(self) -> dict[str, ModelSettings]:
+        """Models by the key of their table: ``model`` and ``models.NAME``."""
+        unnamed = {"model": self.model} if self.model else {}
+        return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
 
 
 def long_name_of(name: str, stated: str | None) -> str:

@@ -56,7 +56,8 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     wanted = [(("rig", "positions", name), name) for name in settings.rig.positions]
     if settings.campaign.period_channel is not None:
         wanted.append((("campaign", "period_channel"), settings.campaign.period_channel))
-    for place, model in settings.all_models().items():
+    for table, model in settings.all_models().items():
+        place = tuple(table.split(".", 1))
         wanted += [((*place, key), n) for key in ("states", "inputs") for n in getattr(model, key)]
     for key, pair in settings.redundant.items():
         wanted += [(("redundant", key, "channels"), name) for name in pair.channels]
