@@ -135,12 +135,11 @@ class Trial:
 
     def between(self) -> list[float]:
         """λ that were not tried, up to the next that is worse on either side of the best."""
-        tried = np.isfinite(self.means)
+        tried = np.flatnonzero(np.isfinite(self.means))
         near = np.flatnonzero(self.means <= (1.0 + ALIKE) * self.best)
-        places = np.flatnonzero(tried)
-        low = places[places < near[0]].max(initial=-1)
-        high = places[places > near[-1]].min(initial=len(tried))
-        return [self.levels[at] for at in range(low + 1, high) if not tried[at]]
+        low = tried[tried < near[0]].max(initial=-1)
+        high = tried[tried > near[-1]].min(initial=len(self.levels))
+        return [self.levels[at] for at in range(low + 1, high) if at not in tried]
 
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
@@ -203,8 +202,6 @@ class Problem:
         Gathered with the longest delays, the longest lead and all observables.
     widest : HankelSettings
         What `data` was gathered with.
-    ridges : tuple of float
-        λ that are tried, in ascending order.
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
@@ -218,7 +215,6 @@ class Problem:
     groups: tuple[str, ...]
     data: TrainingData
     widest: HankelSettings
-    ridges: tuple[float, ...]
     horizons: tuple[int, ...]
     read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(
         default_factory=dict, init=False, repr=False
@@ -308,10 +304,6 @@ class Problem:
             ]
             made = self.taught[of] = key, scales, system_of(groups, windows, wide)
         return made[1:]
-
-    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
-        """λ that are tried of a candidate."""
-        return self.ridges if candidate.has_path else (float(candidate.ridge),)
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
         """Whether the model of all runs grows; neither a filter nor a subspace model does."""
@@ -422,7 +414,6 @@ def _problem(
     widest: HankelSettings,
     given: Given,
     folds: Mapping[str, str] | int,
-    ridges: Iterable[float],
     horizons: tuple[int, ...],
 ) -> Problem | None:
     """The columns of all candidates, which the widest holds; None where the runs are too short.
@@ -452,20 +443,19 @@ def _problem(
     known = None if isinstance(folds, int) else chain
     data = gather(pieces, states, inputs, None, widest, known)
     groups = tuple(pieces if isinstance(folds, int) else folds.values())
-    return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
+    return Problem(pieces, groups, data, widest, horizons)
 
 
 def _problems(
     tried: Candidates,
     folds: Mapping[str, str] | int,
-    ridges: Sequence[float],
     horizons: tuple[int, ...],
 ) -> dict[Columns, Problem]:
     """The columns of all that is tried; none where what it starts from is too long."""
     problems: dict[Columns, Problem] = {}
     for key, widest in tried.widest().items():  # that of the base is the first
         try:
-            problem = _problem(widest, tried.given, folds, ridges, horizons)
+            problem = _problem(widest, tried.given, folds, horizons)
         except RequestError:
             if not problems:
                 raise
@@ -493,6 +483,8 @@ class _Trials:
         What is tried.
     problems : mapping
         Columns of the candidates.
+    ridges : tuple of float
+        λ that are tried, in ascending order.
     known : mapping
         As for :func:`select`.
     executor, progress
@@ -507,6 +499,7 @@ class _Trials:
 
     search: Candidates
     problems: Mapping[Columns, Problem]
+    ridges: tuple[float, ...]
     known: Known
     executor: Executor | None
     progress: Progress | None
@@ -518,10 +511,9 @@ class _Trials:
         """The columns of a candidate."""
         return self.problems[self.search.columns(candidate)]
 
-    @property
-    def best(self) -> Any:
-        """The candidate that errs least."""
-        return min(self.made, key=lambda each: self.made[each].best)
+    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
+        """λ that may be tried of a candidate."""
+        return self.ridges if candidate.has_path else (float(candidate.ridge),)
 
     @property
     def tried(self) -> list[tuple[Any, float]]:
@@ -538,7 +530,7 @@ class _Trials:
             tried = step_of(best)
             self.later -= len(tried) - 1  # the best is among them
             self.judge([best, *tried])
-            best = self.best
+            best = min(self.made, key=lambda each: self.made[each].best)
         return best
 
     def judge(self, candidates: Iterable[HankelSettings]) -> None:
@@ -547,22 +539,24 @@ class _Trials:
         Every ``COARSE``-th λ is tried, and of what errs little more than the best those about its
         own.
         """
-        new = [each for each in dict.fromkeys(candidates) if each not in self.made]
-        new = [each for each in new if self.search.columns(each) in self.problems]
-        coarse = {each: self.problem(each).levels(each)[::COARSE] for each in new}
-        self._try(coarse, 2 * self.later + len(new))
+        new = [
+            each
+            for each in dict.fromkeys(candidates)
+            if each not in self.made and self.search.columns(each) in self.problems
+        ]
+        self._try({each: self.levels(each)[::COARSE] for each in new})
         least = NEAR * min((each.best for each in self.made.values()), default=math.inf)
         self.refine([each for each in new if self.made[each].best <= least])
 
     def refine(self, candidates: Iterable[HankelSettings]) -> None:
         """Try the λ of candidates next to the best of those that were tried."""
-        self._try({each: self.made[each].between() for each in candidates}, 2 * self.later)
+        self._try({each: self.made[each].between() for each in candidates})
 
-    def _try(self, levels: Mapping[Any, Sequence[float]], later: int) -> None:
-        """Try λ of candidates, of which so many more parts are to come."""
+    def _try(self, levels: Mapping[Any, Sequence[float]]) -> None:
+        """Try λ of candidates; each has two parts."""
         problem = next(iter(self.problems.values()))
         folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
-        again = sum(each in self.made for each in levels)  # each has two parts
+        again = sum(each in self.made for each in levels)
         batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
         # The second round begins with the runs that the first one read last.
         order = folds[::-1] if again else folds
@@ -572,6 +566,7 @@ class _Trials:
                 batches.setdefault(alike, []).append((each, own))
         outcomes = in_order(_judged, self.problems, [*batches.items()], self.executor)
         done = len(folds) * (2 * len(self.made) - again)
+        later = 2 * self.later + len(levels) - again
         total = done + sum(map(len, batches.values())) + len(folds) * later
         for ((fold, *_), tried), outcome in zip(batches.items(), outcomes, strict=True):
             for (each, own), judged in zip(tried, outcome, strict=True):
@@ -585,7 +580,7 @@ class _Trials:
             joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
             firsts = [problem.groups.index(problem.groups[fold]) for fold in folds]
             groups = np.repeat(firsts, [len(part) for part in weights])
-            every = self.problem(each).levels(each)
+            every = self.levels(each)
             known = np.full((len(every), joined.size), np.nan)
             if each in self.made:
                 known[:] = self.made[each].scores
@@ -819,7 +814,7 @@ def select(
     base = settings.having(readouts=(), alignment=first)
     whole = Candidates(base, given, samples, step, vary, opened, by_sea, bool(kinds))
     for search in whole.shorter():
-        problems = _problems(search, apart, ridges, horizons)
+        problems = _problems(search, apart, horizons)
         if problems:
             break
     else:  # runs are too short for the shortest
@@ -831,7 +826,9 @@ def select(
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
-    trials = _Trials(search, problems, {} if known is None else known, executor, progress)
+    trials = _Trials(
+        search, problems, tuple(ridges), {} if known is None else known, executor, progress
+    )
     taken, level, words = _chosen(trials, stated, kinds)
     problem = trials.problem(taken)
     readouts = readouts if taken.kind == settings.kind else {}
@@ -1053,7 +1050,7 @@ def readouts_for(
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
     given = runs, states, inputs
-    problem = _problem(settings, given, apart, (ridge,), (steps,))
+    problem = _problem(settings, given, apart, (steps,))
     return _learnt(readouts, problem, settings, ridge, steps, given)
 
 
