@@ -9,7 +9,7 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,7 @@ class Variation:
     """
 
     slopes: FloatArray
-    shifts: tuple[FloatArray, FloatArray, FloatArray]
+    shifts: tuple[FloatArray, ...]
     centre: float
     spread: float
     low: float
@@ -122,25 +122,19 @@ def regress_varying(
     gram: Any = 0.0
     right: Any = 0.0
     for run, (window, part) in enumerate(zip(data.windows, q, strict=True)):
-        system = system_of([[x[run]] for x in series], [window], settings)
+        system, both = system_of([[x[run]] for x in series], [window], settings), [1.0, part]
         own = np.triu(system.gram) + np.triu(system.gram, 1).T
-        gram = gram + np.kron(np.array([[1.0, part], [part, part**2]]), own)
-        right = right + np.concatenate([system.right, part * system.right], axis=1)
+        gram = gram + np.kron(np.outer(both, both), own)
+        right = right + np.kron(both, system.right)
     factor = counts.sum() if settings.ridge_scale == "per_snapshot" else 1.0
     ridge = factor * float(settings.ridge)
-    both = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
+    parts = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
     size = len(data.signature.states)
     fixed, slopes = (
-        spread_means(each, size, settings.state_delays, settings.blocks) for each in both
+        spread_means(each, size, settings.state_delays, settings.blocks) for each in parts
     )
-    variation = Variation(
-        slopes,
-        (shifts[0], shifts[1], shifts[2]),
-        centre,
-        spread,
-        float(known.min()),
-        float(known.max()),
-    )
+    low, high = float(known.min()), float(known.max())
+    variation = Variation(slopes, tuple(shifts), centre, spread, low, high)
     signature = replace(data.signature.scaled(*scales), parameter=parameter)
     data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
@@ -149,14 +143,10 @@ def regress_varying(
 def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
     """Training data of the runs at each value of a parameter."""
     values = [parameter_of(runs[name], parameter, name) for name in data.names]
-    per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs", "zeros")
+    signature, *parts = (getattr(data, each.name) for each in fields(data))
     out = {}
     for value in sorted(set(values)):
         there = [number for number, each in enumerate(values) if each == value]
-        cut: dict[str, Any] = {
-            key: tuple(getattr(data, key)[n] for n in there)
-            for key in per_run
-            if getattr(data, key)
-        }
-        out[value] = replace(data, **cut)
+        own = (tuple(part[number] for number in there if part) for part in parts)
+        out[value] = TrainingData(signature, *own)
     return out
