@@ -400,7 +400,7 @@ CHANGES = {
         ("measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])", "measured = np.stack([states[at : at + windows.steps] for at in starts])", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("if self.made[each].best <= least]", "if self.made[each].best >= least]", "models/test_choice.py::test_the_ridges_about_the_best_of_what_is_taken_are_tried"),
         ("trials.refine([taken])", "pass", "models/test_choice.py::test_the_ridges_about_the_best_of_what_is_taken_are_tried"),
-        ("places[places > near[-1]]", "places[places > near[0]]", "models/test_choice.py::test_the_ridges_about_the_best_are_tried"),
+        ("tried[tried > near[-1]]", "tried[tried > near[0]]", "models/test_choice.py::test_the_ridges_about_the_best_are_tried"),
         ("return self.widest.lead - candidate.lead", "return 0", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
         ("if made[taken].is_as_good_as(made[other]):", "if False:", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("own = {\"ridge\"} if", "own = {\"lead\"} if", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),

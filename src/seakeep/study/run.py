@@ -432,7 +432,7 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
         each
         for ensemble, tests in cases
         for each in held_out(
-            dict.fromkeys(tests, ensemble), tests, steps, statistics.level
+            {name: (ensemble, run) for name, run in tests.items()}, steps, statistics.level
         ).values()
     ]
     nothing = np.full(len(plan.states), np.nan)
