@@ -24,6 +24,7 @@ from collections.abc import (
 )
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -183,7 +184,7 @@ def scores_of(runs: FreeRuns) -> FloatArray:
     with np.errstate(over="ignore", invalid="ignore"):
         errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
     judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
-    errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
+    errors = np.fmin(errors, WORST)
     moved = judged.any(axis=-1)
     return np.mean(errors[:, moved], axis=-1, where=judged[moved])
 
@@ -216,11 +217,9 @@ class Problem:
     data: TrainingData
     widest: HankelSettings
     horizons: tuple[int, ...]
-    read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(default_factory=dict)
     taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
-        default_factory=dict, init=False, repr=False
+        default_factory=dict
     )
 
     def ahead(self, candidate: HankelSettings) -> int:
@@ -432,10 +431,9 @@ def _problem(
         for name, run in runs.items():
             size = run.sizes["time"]
             place = training_window(size - 1, widest.window, before, 0, widest.history)
-            begin = max(place.first_column, before)
-            edges = np.linspace(begin, size - after, folds + 1).astype(int)
+            edges = np.linspace(place.first_column, size - after, folds + 1).astype(int)
             for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
-                samples = slice(max(first - before, 0), stop + after)
+                samples = slice(first - before, stop + after)
                 pieces[f"{name}, part {number}"] = run.isel(time=samples)
         widest = replace(widest, window=None)  # all of the parts, which share it
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
@@ -645,12 +643,8 @@ class Selected(Generic[Chosen]):
         keys = ["observables", "lead", "state_delays", "input_delays"]
         often = ("alignment", "memory", "kind")
         keys += [k for k in often if len({row[k] for row in self.rows}) > 1]
-
-        def candidate(row: dict[str, Any]) -> tuple[Any, ...]:
-            return tuple(row[key] for key in keys)
-
         lines = [self.note]
-        for values, part in itertools.groupby(self.rows, candidate):
+        for values, part in itertools.groupby(self.rows, itemgetter(*keys)):
             best = min(part, key=lambda row: (not row["chosen"], row["score"]))
             what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
             lines.append(
@@ -661,17 +655,13 @@ class Selected(Generic[Chosen]):
 
 
 def settle(
-    settings: Settings,
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    **how: Any,
-) -> Selected[Settings]:
+    settings: Any, runs: Datasets, states: Sequence[str], inputs: Sequence[str], **how: Any
+) -> Selected[Any]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
-    settings : HankelSettings
+    settings : HankelDMDc
         What was asked for; its ``select`` says what is chosen beside λ, and how.
     runs, states, inputs
         As in :func:`select`.
@@ -690,15 +680,14 @@ def settle(
     """
     lacking = _lacking(settings, (runs, states, inputs))
     without = f"not aligned to the surge: {lacking}" if lacking else ""
-    stated, chosen = not isinstance(settings.ridge, str), getattr(settings, "select", None)
-    if stated and chosen is None:
+    if not settings.is_open:
         return Selected(settings, (), without)
     if settings.ridge == 0:
         raise RequestError(
             "free runs choose at λ above zero, and ridge = 0 is stated. Set ridge = 'rollout', or "
             "remove select."
         )
-    asked = chosen or Select()
+    asked, stated = settings.select or Select(), not isinstance(settings.ridge, str)
     selected = select(
         settings,
         runs,
@@ -1083,7 +1072,9 @@ def regular_periods(runs: Datasets, inputs: Sequence[str]) -> dict[str, float]:
     periods, step = {}, labelled.common_step(runs)
     for name, run in runs.items():
         wave = labelled.wave_channel(run, inputs, name)
-        series = np.full(1, np.nan) if wave is None else run[wave].values
+        if wave is None:
+            return {}
+        series = run[wave].values
         stated = run.attrs.get("waves") == "regular"
         if not np.isfinite(series).all() or not (stated or is_regular(series)):
             return {}
