@@ -39,12 +39,12 @@ from seakeep.models import labelled
 from seakeep.models.candidates import Candidates, Columns, Given, Step, alignments_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.inputs import Scale, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
-from seakeep.models.training import TrainingData, gather, scales_of, system_of
+from seakeep.models.training import TrainingData, gather, system_of
 from seakeep.signals import encounter_period, repeated_waves
 from seakeep.signals.waves import is_regular
 
@@ -218,9 +218,7 @@ class Problem:
     widest: HankelSettings
     horizons: tuple[int, ...]
     read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(default_factory=dict)
-    taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
-        default_factory=dict
-    )
+    taught: dict[tuple[int, ...], tuple[Any, Signature, PrimalSystem]] = field(default_factory=dict)
 
     def ahead(self, candidate: HankelSettings) -> int:
         """Samples that delayed regressors look ahead too far."""
@@ -253,7 +251,7 @@ class Problem:
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
         wide = self._widened(candidate)
-        scales, system = self._system(candidate, wide, runs)
+        signature, system = self._system(candidate, wide, runs)
         own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
         lags = np.tile(delayed, z + 1)
         later = np.pad(lags, (0, delayed.size * (wide.input_delays - z)))
@@ -270,9 +268,7 @@ class Problem:
         there = np.concatenate([states, lags, direct])
         coefficients = np.zeros((*path.shape[:2], there.size))
         coefficients[..., there] = path
-        signature = replace(
-            data.signature.scaled(*scales), state_delays=candidate.state_reach, input_delays=z
-        )
+        signature = replace(signature, state_delays=candidate.state_reach, input_delays=z)
         return [Dynamics(each, signature) for each in coefficients]
 
     def _widened(self, candidate: HankelSettings) -> HankelSettings:
@@ -284,24 +280,17 @@ class Problem:
 
     def _system(
         self, candidate: HankelSettings, wide: HankelSettings, runs: Sequence[int]
-    ) -> tuple[list[Scale], PrimalSystem]:
-        """Moments of some runs, and normal equations of all columns with the longest delays."""
+    ) -> tuple[Signature, PrimalSystem]:
+        """Signature of some runs, and normal equations of all columns with the longest delays."""
         ahead, of = self.ahead(candidate), tuple(runs)
         key = ahead, wide.state_delays, wide.memory, wide.is_filter
         made = self.taught.get(of)
         if made is None or made[0] != key:
-            data, chain = self.data, self.data.signature.input_map
-            windows = [data.windows[run] for run in runs]
-            labels = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
-            series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
-            scales = list(scales_of(series, windows, labels, True, chain.stretch))
+            data = self.data.of(runs, self.widest)
             # Later by the samples that a row looks ahead too far.
-            series[1] = [np.roll(each, ahead, axis=0) for each in series[1]]
-            groups = [
-                [scale.deviations(each) for each in group]
-                for group, scale in zip(series, scales, strict=True)
-            ]
-            made = self.taught[of] = key, scales, system_of(groups, windows, wide)
+            delayed = [np.roll(each, ahead, axis=0) for each in data.delayed]
+            system = system_of((data.states, delayed, data.direct), data.windows, wide)
+            made = self.taught[of] = key, data.signature, system
         return made[1:]
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
