@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Progress
+from seakeep.arrays import Datasets, Progress, plain
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, write_text
 from seakeep.models import HankelDMDc
@@ -338,12 +338,11 @@ def _choice(
 
 def _stated(settings: Any, *always: str) -> dict[str, Any]:
     """Settings that differ from their defaults, and those that are stated always."""
-    values = {each.name: getattr(settings, each.name) for each in fields(settings)}
-    differs = {each.name for each in fields(settings) if values[each.name] != each.default}
+    default = {each.name: each.default for each in fields(settings)}
     return {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in values.items()
-        if key in {*always, *differs}
+        key: plain(value)
+        for key, value in vars(settings).items()
+        if key in always or value != default[key]
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +54,7 @@ def fit_readouts(
     readouts: Mapping[str, Asked],
     data: TrainingData,
     runs: Datasets,
-    judged: Sequence[Held],
+    held: Iterable[Held],
 ) -> tuple[FittedReadOut, ...]:
     """Fit read-outs.
 
@@ -66,7 +66,7 @@ def fit_readouts(
         Of the training windows.
     runs : mapping of str to Dataset
         The runs that these are cut from.
-    judged : sequence of Held
+    held : iterable of Held
         Cross-fitted forecasts, for those whose kind is to be chosen; may be empty.
 
     Returns
@@ -83,6 +83,7 @@ def fit_readouts(
     windows = zip(states, data.windows, strict=True)
     seen = np.concatenate([values[window.samples] for values, window in windows])
     follows, out = signature.input_map.follows, []
+    judged = [] if follows is None else [*held]
     spacing = 0.0 if follows is None else follows.place.spacing
     places: FloatArray = STEP * spacing * np.arange(-REACH, REACH + 1.0)
     waves = [_waves(data, runs, number, places) for number in range(len(states) * bool(follows))]

@@ -982,9 +982,8 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        is_judged = problem.data.signature.input_map.follows is not None
-        judged = list(problem.held_out(candidate, level, steps)) if is_judged else []
-        return fit_readouts(readouts, problem.data, problem.runs, judged)
+        held = problem.held_out(candidate, level, steps)
+        return fit_readouts(readouts, problem.data, problem.runs, held)
     settings = replace(candidate, ridge=1.0, standardize=True)
     return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
 
