@@ -224,16 +224,16 @@ def _chosen(
         both = np.stack([each.predicted[..., line.column], load(each.predicted, wave)])
         error = metrics.nrmse(
             predicted=np.maximum(both, floor)[..., None],
-            measured=np.broadcast_to(each.measured[..., line.column], both.shape)[..., None],
+            measured=each.measured[..., [line.column]],
             training_std=line.spread,
         )
         errors.append(np.minimum(error[..., 0], WORST))
-    none, wave = np.concatenate([np.empty((2, 0)), *errors], axis=1)
-    sound = np.isfinite(none) & np.isfinite(wave)
-    if not sound.any():
+    every = np.concatenate([np.empty((2, 0)), *errors], axis=1)
+    none, wave = every[:, np.isfinite(every).all(axis=0)]
+    if not none.size:
         return "none", {}
-    scores = {"none": float(none[sound].mean()), "wave": float(wave[sound].mean())}
-    gain = (none - wave)[sound]
+    scores = {"none": float(none.mean()), "wave": float(wave.mean())}
+    gain = none - wave
     doubt = float(gain.std(ddof=1)) / len(gain) ** 0.5 if len(gain) > 1 else np.inf
     least = max(STANDARD_ERRORS * doubt, LEAST * scores["none"])
     return ("wave" if gain.mean() > least else "none"), scores

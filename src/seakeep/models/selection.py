@@ -206,7 +206,7 @@ class Problem:
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        What :meth:`windows` gave last, by run and lengths, of ``LAST`` of them at most.
+        What :meth:`windows` gave last, by run and horizons, of ``LAST`` of them at most.
     taught : dict
         By the runs that teach, the normal equations of all columns that were made last, which
         candidates share.
@@ -305,16 +305,16 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
-    def windows(self, run: int, horizons: Sequence[int]) -> list[Read]:
+    def windows(self, run: int) -> list[Read]:
         """Windows by which a run is forecast over all horizons, the longest first.
 
         A longer free run begins with the shorter one from the same sample.
         """
-        key = run, tuple(horizons)
+        key = run, self.horizons
         if (found := self.read.get(key)) is None:
             data, dt, name = self.data, self.data.signature.dt, self.data.names[run]
             new, known = dict[int, list[int]](), set[int]()
-            for steps in sorted(horizons, reverse=True):
+            for steps in sorted(self.horizons, reverse=True):
                 new[steps] = [at for at in self.starts(run, steps).tolist() if at not in known]
                 known.update(new[steps])
             places = [
@@ -338,7 +338,7 @@ class Problem:
         runs = range(len(self.groups))
         return [run for run in runs if any(self.starts(run, k).size for k in self.horizons)]
 
-    def free_runs(self, tried: Tried, run: int, horizons: Sequence[int]) -> Iterator[FreeRuns]:
+    def free_runs(self, tried: Tried, run: int) -> Iterator[FreeRuns]:
         """Free runs on a run by models of others, side by side, for each horizon that fits.
 
         Runs of other groups teach, if there are any.
@@ -347,10 +347,10 @@ class Problem:
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]] or rest
         if not candidate.has_path:
-            yield from self._fitted_runs(candidate, others, run, horizons)
+            yield from self._fitted_runs(candidate, others, run)
             return
         models = [each for one in tried for each in self.models(*one, others)]
-        read, ahead = self.windows(run, horizons), self.ahead(candidate)
+        read, ahead = self.windows(run), self.ahead(candidate)
         groups = [
             replace(each, delayed=each.delayed[:, : each.delayed.shape[1] - ahead])
             for _, each, _ in read
@@ -361,31 +361,29 @@ class Problem:
         for (starts, _, measured), computed in zip(read, runs, strict=True):
             ours |= zip(starts, computed.swapaxes(0, 1), strict=True)
             truth |= zip(starts, measured, strict=True)
-        for steps in horizons:
+        for steps in self.horizons:
             if at := self.starts(run, steps).tolist():
                 predicted = np.stack([ours[start][:, :steps] for start in at], axis=1)
                 measured = np.stack([truth[start][:steps] for start in at])
                 yield FreeRuns(predicted, measured, models[0].signature.state_scale.std)
 
-    def _fitted_runs(
-        self, candidate: Any, others: Sequence[int], run: int, horizons: Sequence[int]
-    ) -> Iterator[FreeRuns]:
+    def _fitted_runs(self, candidate: Any, others: Sequence[int], run: int) -> Iterator[FreeRuns]:
         """The same of a candidate that is fitted for itself."""
         own, names = self.data.signature, self.data.names
         given = {names[other]: self.runs[names[other]] for other in others}
         candidate = replace(candidate, window=self.widest.window)
         model, judged = candidate.fit(given, own.states, own.inputs), self.runs[names[run]]
         begin = round((self.data.begin(run) - float(judged["time"][0])) / own.dt)
-        for steps in horizons:
+        for steps in self.horizons:
             if (starts := begin + self.starts(run, steps)).size:
                 predicted, measured = model.judged_runs(judged, names[run], starts, steps)
                 yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
 
     def judge(self, tried: Tried, fold: int) -> list[Scores]:
         """Judge free runs on a run that is held out, over all horizons that fit."""
-        scores = list(map(scores_of, self.free_runs(tried, fold, self.horizons)))
+        scores = list(map(scores_of, self.free_runs(tried, fold)))
         counts = [each.shape[1] for each in scores if each.size]
-        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(counts), 1), counts)
+        weights = np.repeat(np.divide(1.0, counts) / len(counts), counts)
         ends = np.cumsum([len(levels) for _, levels in tried])
         nothing = np.empty((ends[-1], 0))
         parts = np.split(np.concatenate([nothing, *scores], axis=1), ends[:-1])
@@ -393,8 +391,9 @@ class Problem:
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others."""
-        for run in range(len(self.groups)) if len(self.groups) > 1 else ():
-            for predicted, measured, _ in self.free_runs([(candidate, [level])], run, [steps]):
+        own = replace(self, horizons=(steps,))
+        for run in range(len(self.groups)):
+            for predicted, measured, _ in own.free_runs([(candidate, [level])], run):
                 yield Held(run, self.starts(run, steps), predicted[0], measured)
 
 
