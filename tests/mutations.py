@@ -384,8 +384,7 @@ CHANGES = {
     "models/selection.py": [
         ("widest = replace(widest, window=None)  #", "pass  #", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
         ("size - 1, widest.window, before, 0, widest.history", "size - 1, widest.window, before, 0, 'before'", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
-        ("list(self.read)[: len(self.read) - LAST + 1]", "[]", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
-        ("order = folds[::-1] if again else folds", "order = folds", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
+        ("len(self.groups) <= FEW", "True", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("key.lead != lead, near[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
         ("own_lead = 0 if candidate.follows_surge else candidate.lead", "own_lead = candidate.lead", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
         ("if each.at(each.level(alike)) <= least or (is_known", "if (True", "models/test_choice.py::test_what_is_simpler_errs_little_more"),

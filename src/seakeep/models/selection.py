@@ -71,8 +71,8 @@ NEAR = 1.2
 """Error, in parts of the best, above which the other λ of a candidate are left.
 
 On the virtual tank they lower that of a candidate by 7 % at most."""
-LAST = 3
-"""Runs whose windows each problem keeps in memory: the next round begins with them."""
+FEW = 3
+"""Runs up to which a problem keeps their windows in memory."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -206,7 +206,7 @@ class Problem:
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        What :meth:`windows` gave last, by run and horizons, of ``LAST`` of them at most.
+        What :meth:`windows` gave, by run and horizons, where there are but a ``FEW`` runs.
     taught : dict
         By the runs that teach, the normal equations of all columns that were made last, which
         candidates share.
@@ -328,9 +328,8 @@ class Problem:
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
                 # Read-outs are learnt from departures.
                 found.append((starts, *windows.departing(measured, data.zero(run))))
-            for old in list(self.read)[: len(self.read) - LAST + 1]:
-                self.read.pop(old, None)
-            self.read[key] = found
+            if len(self.groups) <= FEW:
+                self.read[key] = found
         return found
 
     def folds(self) -> list[int]:
@@ -544,9 +543,7 @@ class _Trials:
         folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
         again = sum(each in self.made for each in levels)
         batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
-        # The second round begins with the runs that the first one read last.
-        order = folds[::-1] if again else folds
-        for fold, (each, own) in itertools.product(order, levels.items()):
+        for fold, (each, own) in itertools.product(folds, levels.items()):
             if _key(each, fold, own) not in self.known:
                 alike = fold, self.search.columns(each), each.lead if each.has_path else each
                 batches.setdefault(alike, []).append((each, own))

@@ -424,9 +424,10 @@ def slow_motions(
             if not np.all(np.isfinite(values)) or len(values) * dt < shortest:
                 continue
             low = split_bands(values, dt, 1.0 / (SPLIT * encounter_period))[0][:, 0]
-            crossings += int(np.sum(np.diff(np.sign(low - low.mean())) != 0))
+            low -= low.mean()
+            crossings += int(np.count_nonzero(np.diff(np.sign(low))))
             seconds += len(values) * dt
-            slow += float(np.sum((low - low.mean()) ** 2))
+            slow += float(np.sum(low**2))
             whole += float(np.sum((values - values.mean()) ** 2))
         if not whole > 0 or slow <= GOVERNS * whole:
             continue
