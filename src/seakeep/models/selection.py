@@ -541,34 +541,37 @@ class _Trials:
         """Try λ of candidates; each has two parts."""
         problem = next(iter(self.problems.values()))
         folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
-        again = sum(each in self.made for each in levels)
+        keys = {
+            (fold, each): json.dumps([each.to_json(), fold, [*own]], sort_keys=True)
+            for fold, (each, own) in itertools.product(folds, levels.items())
+        }
         batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
-        for fold, (each, own) in itertools.product(folds, levels.items()):
-            if _key(each, fold, own) not in self.known:
+        for (fold, each), key in keys.items():
+            if key not in self.known:
                 alike = fold, self.search.columns(each), each.lead if each.has_path else each
-                batches.setdefault(alike, []).append((each, own))
+                batches.setdefault(alike, []).append((each, levels[each]))
         outcomes = in_order(_judged, self.problems, [*batches.items()], self.executor)
-        done = len(folds) * (2 * len(self.made) - again)
-        later = 2 * self.later + len(levels) - again
-        total = done + sum(map(len, batches.values())) + len(folds) * later
+        known = len({*self.made, *levels})
+        total = 2 * len(folds) * (known + self.later)
+        done = len(folds) * (len(self.made) + known) - sum(map(len, batches.values()))
         for ((fold, *_), tried), outcome in zip(batches.items(), outcomes, strict=True):
-            for (each, own), judged in zip(tried, outcome, strict=True):
-                self.known[_key(each, fold, own)] = [part.tolist() for part in judged]
+            for (each, _), judged in zip(tried, outcome, strict=True):
+                self.known[keys[fold, each]] = [part.tolist() for part in judged]
             done += len(tried)
             if self.progress is not None:
                 self.progress(done, total, f"candidate and fold {done}")
         for each, own in levels.items():
-            found = [map(np.array, self.known[_key(each, fold, own)]) for fold in folds]
+            found = [map(np.array, self.known[keys[fold, each]]) for fold in folds]
             scores, weights = zip(*found, strict=True)
             joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
             firsts = [problem.groups.index(problem.groups[fold]) for fold in folds]
             groups = np.repeat(firsts, [len(part) for part in weights])
             every = self.levels(each)
-            known = np.full((len(every), joined.size), np.nan)
+            rows = np.full((len(every), joined.size), np.nan)
             if each in self.made:
-                known[:] = self.made[each].scores
-            known[[every.index(level) for level in own]] = np.concatenate(scores, axis=1)
-            self.made[each] = Trial(every, known, joined / joined.sum(), groups)
+                rows[:] = self.made[each].scores
+            rows[[every.index(level) for level in own]] = np.concatenate(scores, axis=1)
+            self.made[each] = Trial(every, rows, joined / joined.sum(), groups)
 
     def stable(self, taken: Any, level: float) -> tuple[Any, float]:
         """A candidate and λ; where that grows, the best of all that do not."""
@@ -586,11 +589,6 @@ class _Trials:
         return "".join(
             f"; without {named(o)} {self.made[less].best:.3f}" for o, less in without.items()
         )
-
-
-def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
-    """What scores of a candidate are known by."""
-    return json.dumps([candidate.to_json(), fold, [*levels]], sort_keys=True)
 
 
 def _judged(problems: Mapping[Columns, Problem], batch: tuple[Alike, Tried]) -> list[Scores]:
