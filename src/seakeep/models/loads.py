@@ -170,7 +170,7 @@ class _Line:
         for window, x, wave in zip(data.windows, states, waves, strict=True):
             inside = slice(window.first_column + 1, window.last + 1)
             known, seen = x[inside, [*columns, column]], wave[inside]
-            sound = np.isfinite(known).all(axis=1) & np.isfinite(seen).all(axis=(1, 2))
+            sound = np.isfinite(seen).all(axis=(1, 2))
             self.pieces.append((known[sound], seen[sound].swapaxes(0, 1)))
         moments, products = [], []
         for at in range(len(places)):
