@@ -21,7 +21,6 @@ from seakeep.core.solve import Solution
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
 from seakeep.models.inputs import Signature
-from seakeep.models.settings import HankelSettings
 from seakeep.models.training import TrainingData, system_of
 
 
@@ -66,7 +65,7 @@ class Variation:
 
 
 def regress_varying(
-    data: TrainingData, settings: HankelSettings, parameter: str, values: Sequence[float]
+    data: TrainingData, settings: Any, values: Sequence[float]
 ) -> tuple[Solution, TrainingData, Variation]:
     """Regress on the regressors and on q times them.
 
@@ -74,10 +73,8 @@ def regress_varying(
     ----------
     data : TrainingData
         Gathered runs.
-    settings : HankelSettings
-        Exact delay rows.
-    parameter : str
-        Name of the parameter.
+    settings : HankelDMDc
+        With a parameter, and exact delay rows.
     values : sequence of float
         Parameter of each run.
 
@@ -98,7 +95,7 @@ def regress_varying(
     known, counts = np.array(values), np.array([each.columns for each in data.windows])
     if np.ptp(known) == 0:
         raise DataError(
-            f"all runs have {parameter} = {known[0]:g}, so that nothing can be "
+            f"all runs have {settings.parameter} = {known[0]:g}, so that nothing can be "
             "learnt of it. Train on runs at two values or more, or leave parameter out."
         )
     centre = float(np.average(known, weights=counts))
@@ -135,7 +132,7 @@ def regress_varying(
     )
     low, high = float(known.min()), float(known.max())
     variation = Variation(slopes, tuple(shifts), centre, spread, low, high)
-    signature = replace(data.signature.scaled(*scales), parameter=parameter)
+    signature = replace(data.signature.scaled(*scales), parameter=settings.parameter)
     data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
 
