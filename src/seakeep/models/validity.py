@@ -181,12 +181,12 @@ class Coverage:
     def edges(self) -> FloatArray:
         """Edges of the bands, Hz, shape (band + 1,)."""
         bands = self.first + np.arange(self.shares.shape[1] + 1)
-        return np.asarray(2.0 ** (bands / PER_OCTAVE))
+        return 2.0 ** (bands / PER_OCTAVE)
 
     @cached_property
     def periods(self) -> FloatArray:
         """Middle of each band, s, shape (band,)."""
-        return np.asarray(1.0 / np.sqrt(self.edges[:-1] * self.edges[1:]))
+        return 1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])
 
     @cached_property
     def taught(self) -> BoolArray:
