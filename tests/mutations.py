@@ -391,8 +391,7 @@ CHANGES = {
     "models/selection.py": [
         ("widest = replace(widest, window=None)  #", "pass  #", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
         ("size - 1, widest.window, before, 0, widest.history", "size - 1, widest.window, before, 0, 'before'", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
-        ("list(self.read)[: len(self.read) - LAST + 1]", "[]", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
-        ("order = folds[::-1] if again else folds", "order = folds", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
+        ("len(self.groups) <= FEW", "True", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("key.lead != lead, near[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
         ("own_lead = 0 if candidate.follows_surge else candidate.lead", "own_lead = candidate.lead", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
         ("if each.at(each.level(alike)) <= least or (is_known", "if (True", "models/test_choice.py::test_what_is_simpler_errs_little_more"),
@@ -407,7 +406,7 @@ CHANGES = {
         ("measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])", "measured = np.stack([states[at : at + windows.steps] for at in starts])", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("if self.made[each].best <= least]", "if self.made[each].best >= least]", "models/test_choice.py::test_the_ridges_about_the_best_of_what_is_taken_are_tried"),
         ("trials.refine([taken])", "pass", "models/test_choice.py::test_the_ridges_about_the_best_of_what_is_taken_are_tried"),
-        ("places[places > near[-1]]", "places[places > near[0]]", "models/test_choice.py::test_the_ridges_about_the_best_are_tried"),
+        ("tried[tried > near[-1]]", "tried[tried > near[0]]", "models/test_choice.py::test_the_ridges_about_the_best_are_tried"),
         ("return self.widest.lead - candidate.lead", "return 0", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
         ("if made[taken].is_as_good_as(made[other]):", "if False:", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("own = {\"ridge\"} if", "own = {\"lead\"} if", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
@@ -430,7 +429,7 @@ CHANGES = {
     ],
     "models/validity.py": [
         ("period = 2.0 * seconds / crossings", "period = seconds / crossings", "models/test_slow.py::test_the_period_of_a_slow_drift_is_found"),
-        ("periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])", "periods = np.sqrt(edges[:-1] * edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
+        ("1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])", "np.sqrt(self.edges[:-1] * self.edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
         ("unseen > 0.5,", "unseen > 2.0,", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
         ("heights > margin * self.heights", "heights > 9 * margin * self.heights", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("elevations & (steepnesses > margin", "elevations & (steepnesses < margin", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),

@@ -22,7 +22,7 @@ from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import Model, counted
 from seakeep.models.growth import LeadErrors, lead_errors, stretches_of, weighed_runs
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
+from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
@@ -168,9 +168,10 @@ class LinearSpec(LinearKind, Plain):
             return HankelDMDcModel.fitted(spec, data, solution, named)
         read = named = until(named, stop)
         if spec.window is not None:  # what the model reads, and no more
-            dt = common_step(named)
-            reach = spec.needs(dt, mean_period(named, inputs) * dt).history + spec.window
-            read = {name: run.isel(time=slice(-reach, None)) for name, run in named.items()}
+            input_map = spec.input_map(named, states, inputs, spec.window)
+            before = spec.centre + input_map.history(spec.input_delays)
+            first = -spec.window - max(spec.state_reach, before)
+            read = {name: run.isel(time=slice(first, None)) for name, run in named.items()}
         start = replace(spec, window=None, ridge=RIDGES[-1], ridge_scale="per_snapshot")
         chosen = select(
             start,

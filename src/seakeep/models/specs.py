@@ -479,7 +479,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         data = gather(runs, states, inputs, None, self)
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
-            solution, data, variation = regress_varying(data, self, self.parameter, values)
+            solution, data, variation = regress_varying(data, self, values)
             model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
             return replace(model, variation=variation)
         solution = data.regress(self)

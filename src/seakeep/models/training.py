@@ -110,6 +110,16 @@ class TrainingData:
         x, u, w = (scale.physical(values[run]) for scale, values in groups)
         return x, u, w
 
+    def of(self, runs: Iterable[int], settings: HankelSettings) -> TrainingData:
+        """Some of the runs, on deviations from their own moments."""
+        own = self.signature
+        pieces = [
+            Piece(self.names[run], self.physical(run), self.windows[run], self.instants[run])
+            for run in runs
+        ]
+        labels = own.state_labels, own.input_labels
+        return _standardised(pieces, own.dt, labels, own.input_map, replace(settings, centre=0))
+
     def regress(self, settings: HankelSettings) -> Solution:
         """Rows of the next states, or of all delayed ones, from these data.
 

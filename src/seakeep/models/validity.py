@@ -6,9 +6,9 @@ Slow motions of which a training window holds too few cycles to estimate mean an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntFlag
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -169,18 +169,6 @@ class Coverage:
     heights, steepnesses : ndarray, shape (channel,)
         Largest ones of a window: four SDs, of regular waves 2√2, and that over the length in deep
         water of a wave of the mean period.
-
-    Attributes
-    ----------
-    edges : ndarray, shape (band + 1,)
-        Edges of the bands, Hz.
-    periods : ndarray, shape (band,)
-        Middle of each band, s.
-    taught, known : ndarray of bool, shape (channel, band)
-        Bands that were trained, and those with the bands beside them: the leakage of a taper
-        reaches there.
-    elevations : ndarray of bool, shape (channel,)
-        Inputs that are wave elevations.
     """
 
     channels: tuple[str, ...]
@@ -188,23 +176,35 @@ class Coverage:
     shares: FloatArray
     heights: FloatArray
     steepnesses: FloatArray
-    edges: FloatArray = field(init=False, repr=False)
-    periods: FloatArray = field(init=False, repr=False)
-    taught: BoolArray = field(init=False, repr=False)
-    known: BoolArray = field(init=False, repr=False)
-    elevations: BoolArray = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        edges = 2.0 ** ((self.first + np.arange(self.shares.shape[1] + 1)) / PER_OCTAVE)
-        taught = self.shares >= TRAINED
-        known = taught.copy()
-        known[:, 1:] |= taught[:, :-1]
-        known[:, :-1] |= taught[:, 1:]
-        elevations = np.array([is_elevation(each) for each in self.channels], dtype=bool)
-        periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
-        made = {"edges": edges, "periods": periods, "taught": taught, "known": known}
-        for name, value in (made | {"elevations": elevations}).items():
-            object.__setattr__(self, name, value)
+    @cached_property
+    def edges(self) -> FloatArray:
+        """Edges of the bands, Hz, shape (band + 1,)."""
+        bands = self.first + np.arange(self.shares.shape[1] + 1)
+        return 2.0 ** (bands / PER_OCTAVE)
+
+    @cached_property
+    def periods(self) -> FloatArray:
+        """Middle of each band, s, shape (band,)."""
+        return 1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])
+
+    @cached_property
+    def taught(self) -> BoolArray:
+        """Bands that were trained, shape (channel, band)."""
+        return self.shares >= TRAINED
+
+    @cached_property
+    def known(self) -> BoolArray:
+        """Those, and the bands beside them: the leakage of a taper reaches there."""
+        known = self.taught.copy()
+        known[:, 1:] |= self.taught[:, :-1]
+        known[:, :-1] |= self.taught[:, 1:]
+        return known
+
+    @cached_property
+    def elevations(self) -> BoolArray:
+        """Inputs that are wave elevations, shape (channel,)."""
+        return np.array([is_elevation(each) for each in self.channels], dtype=bool)
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -424,9 +424,10 @@ def slow_motions(
             if not np.all(np.isfinite(values)) or len(values) * dt < shortest:
                 continue
             low = split_bands(values, dt, 1.0 / (SPLIT * encounter_period))[0][:, 0]
-            crossings += int(np.sum(np.diff(np.sign(low - low.mean())) != 0))
+            low -= low.mean()
+            crossings += int(np.count_nonzero(np.diff(np.sign(low))))
             seconds += len(values) * dt
-            slow += float(np.sum((low - low.mean()) ** 2))
+            slow += float(np.sum(low**2))
             whole += float(np.sum((values - values.mean()) ** 2))
         if not whole > 0 or slow <= GOVERNS * whole:
             continue
