@@ -245,7 +245,7 @@ CHANGES = {
         ("(error / square - apart / variance)", "(error / square)", "test_metrics.py::test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says"),
     ],
     "models/alignment.py": [
-        ("at = surge[first:stop] + rig.offsets[column]", "at = rig.offsets[column] - surge[first:stop]", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
+        ("carrier.at(surge[read] + offset,", "carrier.at(offset - surge[read],", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
         ("offset + (trained - here)", "offset + (here - trained)", "models/test_alignment.py::test_a_probe_that_was_moved_and_says_so_changes_nothing"),

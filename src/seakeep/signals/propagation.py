@@ -21,6 +21,7 @@ from seakeep.arrays import (
     ArrayLike,
     ComplexArray,
     FloatArray,
+    IntArray,
     as_pair,
     as_series,
     number,
@@ -509,7 +510,7 @@ class CarriedElevation:
     highest: float
     terms: FloatArray = field(repr=False)
 
-    def at(self, distance: ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
+    def at(self, distance: ArrayLike, sample: int | slice | IntArray = slice(None)) -> FloatArray:
         """Elevation at a distance from where it was measured."""
         half = 0.5 * (self.highest - self.lowest)
         place = np.asarray(distance, float) - 0.5 * (self.highest + self.lowest)
