@@ -418,15 +418,12 @@ class SubspaceModel(Model):
 
     def _free_run(self, windows: Windows) -> FloatArray:
         signature, histories = self.signature, windows.histories
-        reach, direct = signature.input_delays + windows.steps, windows.direct
-        driving = windows.delayed[:, -reach:]
-        if not signature.inputs:
-            driving, direct = (np.zeros((len(histories), n, 0)) for n in (reach, windows.steps))
+        reach = signature.input_delays + windows.steps
         values = self.space.free_runs(
             signature.state_scale.deviations(histories[:, -1 - signature.state_delays :]),
-            signature.input_scale.deviations(driving),
+            signature.input_scale.deviations(windows.delayed[:, -reach:]),
             windows.steps,
-            signature.direct_scale.deviations(direct),
+            signature.direct_scale.deviations(windows.direct),
         )
         with np.errstate(over="ignore"):  # a run that is lost is cut just below
             values = signature.state_scale.physical(values, out=values)

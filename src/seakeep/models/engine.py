@@ -279,10 +279,7 @@ def _series(
             for group in zip(*before, strict=True)
         ]
     if follows is None:
-        read = [
-            drive.rows(span.first, span.stop if signature.inputs else span.known + 1)
-            for drive, span in pairs
-        ]
+        read = [drive.rows(span.first, span.stop) for drive, span in pairs]
         delayed = np.stack([each.delayed for each in read])
         direct = np.stack([each.direct[z:] for each in read])
         if reference:
@@ -416,14 +413,16 @@ class _Opened:
         maps, names = signature.input_map, signature.inputs
         read = [maps.reads(span) for span in self.spans]
         first = min(each.first for each in read)
-        stop = max(each.stop for each in read) if names else first
+        stop = max(each.stop for each in read)
         surge = None
         if (follows := maps.follows) is not None:
             last = max(span.known for span in self.spans) + 1  # no later state is read
             channel, rows = [signature.states[follows.column]], slice(first, last)
             surge = labelled.channel_matrix(self.run, channel, self.name, rows)[:, 0]
         for run in self._continued(signature, first, stop) if predicts else [self.run]:
-            values = labelled.channel_matrix(run, names, self.name, slice(first, stop))
+            values = np.empty((stop - first, 0))  # without inputs it may end after the run
+            if names:
+                values = labelled.channel_matrix(run, names, self.name, slice(first, stop))
             for each in read:
                 wanted = values[each.first - first : each.stop - first]
                 labelled.check_finite(wanted, names, run, self.name, each.first)
@@ -465,16 +464,14 @@ def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Fo
     Positions are NaN where none is known. Without a run they are those of training, if the model
     takes raw probes.
     """
-    places: tuple[float | None, ...] = (None,)
+    places: Sequence[float | None] = (None,)
     depth = math.nan
     if (alignment := signature.input_map.alignment) is not None:
         if run is not None or signature.input_map.follows is not None:
             _, places, depth = alignment.rig(run)
     elif run is not None:
-        stated = [run.attrs.get("water_depth")]
-        stated += [run[name].attrs.get("x_position") for name in signature.inputs]
-        numbers = [float(x) if isinstance(x, int | float | np.number) else math.nan for x in stated]
-        depth, places = numbers[0], tuple(numbers[1:])
+        depth = float(run.attrs.get("water_depth", math.nan))
+        places = [run[name].attrs.get("x_position") for name in signature.inputs]
     known = np.array(places, dtype=float)  # None becomes NaN
     positions = np.where(math.isnan(depth), math.nan, known)
     return partial(foresee, dt=signature.dt, positions=positions, depth=depth)
@@ -598,7 +595,7 @@ def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
         steps = windows.steps
         driving = windows.delayed[:, windows.delayed.shape[1] - own.input_delays - steps :]
         if not driving.shape[2]:
-            driving = np.zeros((len(driving), steps, 0))
+            driving = driving[:, :steps]
         history = own.state_scale.deviations(windows.histories[:, -1 - own.state_delays :])
         direct = own.direct_scale.deviations(windows.direct)
         batches.append((history, own.input_scale.deviations(driving), direct))
@@ -616,8 +613,6 @@ def _excess(signature: Signature, windows: Windows) -> FloatArray:
     """
     z = signature.input_delays
     first = windows.delayed.shape[1] - z - windows.steps
-    if first < 0:  # without inputs
-        return np.ones((len(windows), windows.steps))
     delayed, direct = (
         # The slow surge squared is no input.
         (np.abs(x - scale.centre[: x.shape[2]]) / scale.bound[: x.shape[2]]).max(axis=2, initial=1)
