@@ -84,6 +84,11 @@ def warn(message: str) -> None:
 _WITHIN = ("seakeep", "functools", "contextlib")
 
 
+def quietly() -> "warnings.catch_warnings[None]":
+    """Ignore the SeakeepWarnings of what is done within."""
+    return warnings.catch_warnings(action="ignore", category=SeakeepWarning)
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return ``" Did you mean 'x'?"`` for the known name nearest to `name`, or an empty string.
 

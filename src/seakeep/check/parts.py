@@ -1,6 +1,5 @@
 """Data of the checks: test parts of runs without gaps, and free runs over them."""
 
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,7 +10,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
+from seakeep.errors import DataError, RequestError, SeakeepError, quietly, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, nearest_sample, run_step
 from seakeep.models.observables import at_once
@@ -218,8 +217,7 @@ def beside(
     """Free runs of baselines over those of a model; one that lacks a run is left out."""
     others = {}
     for label, each in (baselines or {}).items():
-        with warnings.catch_warnings(), suppress(DataError):
-            warnings.simplefilter("ignore", SeakeepWarning)
+        with quietly(), suppress(DataError):
             others[label] = free_runs(each, runs, free, label, own)
     return {label: of for label, of in others.items() if of.keys() == own.keys()}
 

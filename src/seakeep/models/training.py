@@ -116,7 +116,6 @@ class TrainingData:
         Means over blocks of delayed states enter as regressors without delays; the rows that are
         returned spread them over these delays.
         """
-        blocks = settings.blocks
         solution = identify(
             self.states,
             self.delayed,
@@ -130,9 +129,7 @@ class TrainingData:
             all_rows=settings.delay_rows == "ridge",
             radius=settings.radius,
         )
-        count = len(self.signature.states)
-        if not blocks:
-            return solution
+        count, blocks = len(self.signature.states), settings.blocks
         spread = spread_means(solution.coefficients, count, settings.state_delays, blocks)
         return replace(solution, coefficients=spread)
 
@@ -306,8 +303,8 @@ def departures(
     """
     out, zeros = [], []
     for each, window in zip(series, windows, strict=True):
-        first = window.first, window.first, max(window.first, window.first_column)
-        means = [x[at : window.last + 1].mean(axis=0) for x, at in zip(each, first, strict=True)]
+        cuts = zip(each, _counted(window), strict=True)
+        means = [values[own].mean(axis=0) for values, own in cuts]
         if input_map.follows is not None:
             means[0][input_map.follows.column] = means[2][-1] = 0.0
         out.append(tuple(values - mean for values, mean in zip(each, means, strict=True)))
@@ -567,28 +564,34 @@ def scales_of(
 ) -> tuple[Scale, Scale, Scale]:
     """Moments of states, delayed and direct regressors.
 
-    What regressors are divided by is stretched where λ weighs more on them. Direct ones count from
-    the first snapshot pair on: before it they may need inputs that are not there.
+    What regressors are divided by is stretched where λ weighs more on them.
     """
-    later = windows
-    if channels[2]:
-        later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
+    counted = zip(*map(_counted, windows), strict=True)
     x, u, w = (
-        moments(values, spans, labels, standardize)
-        for values, spans, labels in zip(series, (windows, windows, later), channels, strict=True)
+        moments([values[own] for values, own in zip(every, cut, strict=True)], labels, standardize)
+        for every, cut, labels in zip(series, counted, channels, strict=True)
     )
     if stretch is not None and standardize:
         u, w = (replace(own, std=own.std * by) for own, by in zip((u, w), stretch, strict=True))
     return x, u, w
 
 
+def _counted(window: TrainingWindow) -> tuple[slice, slice, slice]:
+    """Samples of states, delayed and direct regressors that moments are taken of.
+
+    Direct ones count from the first snapshot pair on: before it they may need inputs that are not
+    there.
+    """
+    first = max(window.first, window.first_column)
+    return window.samples, window.samples, slice(first, window.last + 1)
+
+
 def moments(
     series: Sequence[FloatArray],
-    windows: Sequence[TrainingWindow] | None,
     labels: Sequence[ChannelLabel],
     standardize: bool,
 ) -> Scale:
-    """Means and standard deviations (ddof = 1) over the windows of all runs, or all of them.
+    """Means and standard deviations (ddof = 1) over all runs.
 
     Raises
     ------
@@ -597,8 +600,6 @@ def moments(
     """
     if not labels:
         return Scale(*np.zeros((5, 0)))
-    if windows is not None:
-        series = [values[window.samples] for values, window in zip(series, windows, strict=True)]
     # Sums along contiguous memory take half the time.
     pooled = np.ascontiguousarray(np.concatenate(list(series)).T)
     with np.errstate(over="ignore"):
