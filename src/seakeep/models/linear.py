@@ -16,7 +16,6 @@ from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefine
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
-from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name
 from seakeep.models.growth import LeadErrors, linear_errors, stretches_of, weighed_runs
@@ -121,11 +120,6 @@ class HankelDMDcModel(Model):
     def _errors_in(self, data: TrainingData, runs: Datasets) -> LeadErrors | None:
         stretches = stretches_of(data, self.signature, runs)
         return linear_errors([self.dynamics], stretches, self.signature.readouts)
-
-    @property
-    def alignment(self) -> FittedAlignment | None:
-        """How the wave input is aligned to the vessel, as completed from the training runs."""
-        return self.signature.input_map.alignment
 
     @property
     def state_scale(self) -> Scale:
