@@ -49,6 +49,12 @@ def _as_grid(values: npt.ArrayLike) -> FloatArray:
     return grid
 
 
+def _is_even(grid: FloatArray) -> bool:
+    """Whether a grid has one step."""
+    steps = np.diff(grid)
+    return np.allclose(steps, steps.mean(), rtol=1e-6, atol=0.0)
+
+
 def _redrawn(series: FloatArray, positions: IntArray) -> tuple[FloatArray, IntArray]:
     """Samples in ascending order, and how often each stands in each row of positions."""
     order = np.argsort(series, kind="stable")
@@ -138,7 +144,7 @@ def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> f
 def _densities(ordered: FloatArray, times: IntArray, grid: FloatArray, h: FloatArray) -> FloatArray:
     """Densities, shape (row, grid), of the rows of :func:`_redrawn`, each with its bandwidth."""
     span, steps = grid[-1] - grid[0], grid.size - 1
-    even = np.allclose(np.diff(grid), span / steps, rtol=1e-6, atol=0.0)
+    even = _is_even(grid)
     # Bins between two grid points, of the narrowest kernel, and grid points beyond either end.
     fine = math.ceil(min(span / steps / h.min() * BINS_PER_BANDWIDTH, MOST_BINS))
     beyond = math.ceil(min(REACH * h.max() / span * steps, MOST_BINS))
@@ -277,8 +283,7 @@ def checked_grid(
             f"the grid runs from {points[0]:g} to {points[-1]:g} and the series from {low:g} to "
             f"{high:g}; mass outside would be lost. Use density_grid(…) of all the series."
         )
-    steps = np.diff(points)
-    if not np.allclose(steps, steps.mean(), rtol=1e-6, atol=0.0):
+    if not _is_even(points):
         raise RequestError("the grid must be evenly spaced here; use density_grid(…).")
     return points
 
