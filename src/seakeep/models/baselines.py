@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, whole_number
+from seakeep.arrays import FloatArray, undefined, whole_number
 from seakeep.core.embedding import History
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
@@ -425,7 +425,7 @@ class SubspaceModel(Model):
             windows.steps,
             signature.direct_scale.deviations(windows.direct),
         )
-        with np.errstate(over="ignore"):  # a run that is lost is cut just below
+        with undefined():  # a run that is lost is cut just below
             values = signature.state_scale.physical(values, out=values)
         values = cut_lost(values, signature, windows)
         return values if windows.zero is None else values + windows.zero[:, None]

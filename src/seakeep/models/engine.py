@@ -27,6 +27,7 @@ from seakeep.arrays import (
     IntArray,
     Progress,
     check_choice,
+    undefined,
     whole_number,
 )
 from seakeep.core.recursion import Recursion, read_table, recursion
@@ -298,7 +299,7 @@ def _series(
             offsets[drive] = length - first
             length += len(table)
         starts.append(offsets[drive] + span.known)
-    table = tables[0] if len(tables) == 1 else np.concatenate(tables)
+    table = np.concatenate(tables)
     steps, at = spans[0].stop - spans[0].known, np.array(starts)
     here = np.stack([drive.places(span.first, span.known + 1) for drive, span in pairs])
     here = np.concatenate([here, here[:, -1:].repeat(steps - 1, axis=1)], axis=1)
@@ -536,8 +537,7 @@ def linear_runs(
         runs = [_followed_runs(members, windows) for windows in groups]
     else:
         every = zip(*(_open_runs(each, groups) for each in members), strict=True)
-        # One member needs no copy.
-        runs = [np.stack(each) if len(each) > 1 else each[0][None] for each in every]
+        runs = [np.stack(each) for each in every]
     for values, windows in zip(runs, groups, strict=True):
         if readouts:
             read_out(readouts, values, windows.waves)
@@ -580,7 +580,7 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     computed, used = recursion(
         models, follows.place, histories, delayed, windows.table, windows.starts, forcing
     )
-    with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
+    with undefined():  # a run that is lost is cut just below
         for values, drove, of in zip(computed, used, own, strict=True):
             driving = np.concatenate([delayed, drove], axis=1)
             of.state_scale.physical(values, out=values)
@@ -600,7 +600,7 @@ def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
         direct = own.direct_scale.deviations(windows.direct)
         batches.append((history, own.input_scale.deviations(driving), direct))
     computed = rollouts(*member.matrices, batches, n_states=len(own.state_labels))
-    with np.errstate(over="ignore"):  # a run that is lost is cut just below
+    with undefined():  # a run that is lost is cut just below
         for windows, values in zip(groups, computed, strict=True):
             cut_lost(own.state_scale.physical(values, out=values), own, windows)
     return computed
@@ -639,7 +639,7 @@ def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> Floa
     scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
     reach = GROWTH * np.maximum(scale.bound, start)
-    with np.errstate(invalid="ignore", over="ignore"):
+    with undefined():
         farthest = np.zeros(values.shape[:2])
         for column, centre in enumerate(scale.centre):  # one after the other takes little room
             away = np.abs(values[..., column] - centre)

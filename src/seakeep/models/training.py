@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.core import gram
 from seakeep.core.embedding import (
     History,
@@ -350,20 +350,21 @@ class TrainingArrays:
         runs: Datasets,
         states: Sequence[str],
         inputs: Sequence[str],
-        samples: Sequence[tuple[int, int]],
+        firsts: Sequence[int],
         input_map: InputMap,
     ) -> Self:
-        """Samples from the first to before the second of each run."""
+        """Samples of each run from the first that a member reads on."""
         read = []
-        for (name, run), (first, end) in zip(runs.items(), samples, strict=True):
+        for (name, run), first in zip(runs.items(), firsts, strict=True):
             time = np.asarray(run["time"].values, dtype=float)
-            x = labelled.channel_matrix(run, states, name, slice(first, end))
+            end = time.size
+            x = labelled.channel_matrix(run, states, name, slice(first, None))
             labelled.check_finite(x, states, run, name, first)
             span = Span(first, end - 1, max(end - input_map.lead_samples, first))
             u, v = run_regressors(input_map, run, states, inputs, name, span)
             for values in (x, u, v):
                 values.flags.writeable = False
-            read.append((name, x, u, v, first, float(time[min(first, time.size - 1)])))
+            read.append((name, x, u, v, first, float(time[min(first, end - 1)])))
         return cls(*zip(*read, strict=True))
 
     def without(self, run: int) -> Self:
@@ -602,7 +603,7 @@ def moments(
         return Scale(*np.zeros((5, 0)))
     # Sums along contiguous memory take half the time.
     pooled = np.ascontiguousarray(np.concatenate(list(series)).T)
-    with np.errstate(over="ignore"):
+    with undefined():
         mean = pooled.sum(axis=1) / pooled.shape[1]
         centred = pooled - mean[:, None]
         spread = np.sqrt(np.einsum("ct,ct->c", centred, centred) / (pooled.shape[1] - 1))

@@ -27,6 +27,7 @@ from seakeep.arrays import (
     number,
     positive,
     time_step,
+    undefined,
 )
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
@@ -134,7 +135,7 @@ def phase_celerity(
     phase = expected + np.angle(np.conj(cross) * np.exp(-1j * expected))
     phase = np.maximum(phase, 1e-9)
     celerity = 2 * np.pi * frequency * apart / phase
-    with np.errstate(divide="ignore"):
+    with undefined():
         error = np.sqrt((1.0 - coherence) * length / (2.0 * first.size * coherence))
     return PhaseCelerity(frequency, celerity, coherence, celerity * error / phase)
 
