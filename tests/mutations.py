@@ -282,7 +282,7 @@ CHANGES = {
         ("lost[part.start : number] = first", "lost[: len(members)] = first", "models/test_ensemble.py::test_members_that_diverge_say_when"),
         ("farthest <= _excess(signature, windows)", "farthest <= 1.0", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
-        ("first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
+        ("slice(span.known + 1 - signature.state_samples", "slice(span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
         ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
         ("[:, -reference:].mean(axis=1)", "[:, -1:].mean(axis=1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
         ("zero[:, follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),

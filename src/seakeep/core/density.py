@@ -255,11 +255,10 @@ def density_grid(
     """
     whole_number(points, "points", 2)
     all_of_them = [as_bundle(item, "the series") for item in series]
-    rows = (_once(each) for x in all_of_them for each in x)
-    widths = np.concatenate([_bandwidths(*row, bandwidth) for row in rows])
-    low = float(min(map(np.min, all_of_them)) - margin * widths.max())
-    high = float(max(map(np.max, all_of_them)) + margin * widths.max())
-    narrow = float(widths.min())
+    widths = [kernel_bandwidth(each, bandwidth) for x in all_of_them for each in x]
+    low = float(min(map(np.min, all_of_them)) - margin * max(widths))
+    high = float(max(map(np.max, all_of_them)) + margin * max(widths))
+    narrow = min(widths)
     step = (high - low) / (points - 1)
     if step > COARSE * narrow:
         warn(
@@ -292,8 +291,8 @@ def bootstrapped_densities(
     series: FloatArray, positions: IntArray, grid: FloatArray, bandwidth: Bandwidth
 ) -> FloatArray:
     """Densities of one series redrawn at the given positions."""
-    drawn, own = _redrawn(series, positions), _bandwidths(*_once(series), bandwidth)
-    return _densities(*drawn, grid, _bandwidths(*drawn, bandwidth, own[0]))
+    drawn, own = _redrawn(series, positions), kernel_bandwidth(series, bandwidth)
+    return _densities(*drawn, grid, _bandwidths(*drawn, bandwidth, own))
 
 
 @dataclass(frozen=True)

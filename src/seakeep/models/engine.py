@@ -64,12 +64,8 @@ class Windows:
 
     Parameters
     ----------
-    places : tuple of (str, float)
-        Run and start of each window, s.
     steps : int
         Instants forecast from each start.
-    time : tuple of Variable, each of shape (steps,)
-        These instants.
     histories : ndarray, shape (window, at least s + 1, N)
         Measured states up to each start, physical units.
     delayed : ndarray, shape (window, z + steps, n)
@@ -77,6 +73,10 @@ class Windows:
         start on those at the place of the start.
     direct : ndarray, shape (window, steps, m)
         Direct regressors from the start on; then without the slow surge squared.
+    places : tuple of (str, float)
+        Run and start of each window, s.
+    time : tuple of Variable, each of shape (steps,)
+        Instants that are forecast, where they are of a run.
     notes : dict
         What a forecast's attributes report of the first run, of the input map there, and of how
         far ahead it reads.
@@ -97,12 +97,12 @@ class Windows:
         opposites.
     """
 
-    places: tuple[tuple[str, float], ...]
     steps: int
-    time: tuple[xr.Variable, ...]
     histories: FloatArray
     delayed: FloatArray
     direct: FloatArray
+    places: tuple[tuple[str, float], ...] = ()
+    time: tuple[xr.Variable, ...] = ()
     notes: Mapping[str, str | float] = field(default_factory=dict)
     table: FloatArray | None = None
     starts: IntArray | None = None
@@ -225,11 +225,8 @@ def _windows(signature: Signature, runs: Sequence[_Opened], spans: Sequence[Span
         attrs = dict(run.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
         instants = run.instants(span.known + 1, span.stop + 1, dt)
         time.append(xr.Variable(("time",), instants, attrs))
-        first = span.known + 1 - signature.state_samples
-        rows = slice(first, span.known + 1)
-        states = labelled.channel_matrix(run.run, signature.states, run.name, rows)
-        labelled.check_finite(states, signature.states, run.run, run.name, first)
-        histories.append(states)
+        rows = slice(span.known + 1 - signature.state_samples, span.known + 1)
+        histories.append(labelled.sound_matrix(run.run, signature.states, run.name, rows))
         look_ahead.append(maps.look_ahead(run.run, dt))
         step = steps
         if run.known is not None:
@@ -517,9 +514,8 @@ def array_windows(
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
         drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
     return Windows(
-        places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
-        time=(),
+        places=(("these arrays", 0.0),) * len(histories),
         **_series(signature, histories, drives, [span] * len(drives)),
     )
 

@@ -112,9 +112,7 @@ class Stretch:
             places = [(name, begin + at * signature.dt) for at in starts]
             return read_groups(signature, {name: run}, [(places, steps)])[0]
         return Windows(
-            places=(("training", 0.0),) * len(starts),
             steps=steps,
-            time=(),
             histories=np.stack([self.states[at - s : at + 1] for at in starts]),
             delayed=np.stack([self.delayed[at - z : at + steps] for at in starts]),
             direct=np.stack([self.direct[at : at + steps] for at in starts]),
@@ -232,7 +230,7 @@ def stretches_of(data: TrainingData, signature: Signature, runs: Datasets) -> li
         if input_map.reference:  # which the run holds before a start, not the window
             skipped = round((data.begin(number) - float(runs[name]["time"][0])) / signature.dt)
             first = max(first, signature.history_samples - 1 - skipped)
-        stretches.append(Stretch(*own, first, window.last, source, data.zero(number)))
+        stretches.append(Stretch(*own, first, window.last, source, data.zeros[number]))
     return stretches
 
 

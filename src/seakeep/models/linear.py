@@ -154,12 +154,12 @@ class HankelDMDcModel(Model):
     @cached_property
     def A(self) -> FloatArray:
         """Â, shape (N(s+1), N(s+1)), on standardised deviations, newest block first."""
-        return _read_only(self.dynamics.system.astype(float, copy=False))
+        return _read_only(self.dynamics.system)
 
     @cached_property
     def B(self) -> FloatArray:
         """B̂, shape (N(s+1), Q(z+1)), on standardised deviations, newest block first."""
-        b = self.dynamics.matrices[1].astype(float, copy=False)
+        b = self.dynamics.matrices[1]
         missing = self.A.shape[0] - b.shape[0]
         return _read_only(np.concatenate([b, np.zeros((missing, b.shape[1]))]))
 

@@ -91,10 +91,6 @@ class TrainingData:
     inputs: tuple[FloatArray, ...] = ()
     zeros: tuple[FloatArray, ...] = ()
 
-    def zero(self, run: int) -> FloatArray | float:
-        """What the states of a run depart from, physical units."""
-        return self.zeros[run] if self.zeros else 0.0
-
     def begin(self, run: int) -> float:
         """Instant of the first sample of a run's arrays, s."""
         return self.instants[run][0] - self.windows[run].first * self.signature.dt
@@ -271,7 +267,7 @@ def _standardised(
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
     names, series, windows, instants = zip(*pieces, strict=True)
-    zeros: tuple[FloatArray, ...] = ()
+    zeros = (np.zeros(len(labels[0])),) * len(names)
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
     # A look-ahead leaves the last row, which is no column, without regressors.
@@ -358,8 +354,7 @@ class TrainingArrays:
         for (name, run), first in zip(runs.items(), firsts, strict=True):
             time = np.asarray(run["time"].values, dtype=float)
             end = time.size
-            x = labelled.channel_matrix(run, states, name, slice(first, None))
-            labelled.check_finite(x, states, run, name, first)
+            x = labelled.sound_matrix(run, states, name, slice(first, None))
             span = Span(first, end - 1, max(end - input_map.lead_samples, first))
             u, v = run_regressors(input_map, run, states, inputs, name, span)
             for values in (x, u, v):
