@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -532,8 +532,10 @@ def linear_runs(
     if any(windows.table is not None for windows in groups):
         runs = [_followed_runs(members, windows) for windows in groups]
     else:
-        every = zip(*(_open_runs(each, groups) for each in members), strict=True)
-        runs = [np.stack(each) for each in every]
+        every = (
+            open_runs(each.signature, groups, partial(rollouts, *each.matrices)) for each in members
+        )
+        runs = [np.stack(each) for each in zip(*every, strict=True)]
     for values, windows in zip(runs, groups, strict=True):
         if readouts:
             read_out(readouts, values, windows.waves)
@@ -584,21 +586,37 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     return computed
 
 
-def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
-    """Free runs over all windows as products of matrices."""
-    own, batches = member.signature, []
+def open_runs(
+    signature: Signature,
+    groups: Sequence[Windows],
+    run: Callable[[list[tuple[FloatArray, FloatArray, FloatArray]]], list[FloatArray]],
+) -> list[FloatArray]:
+    """Free runs over all windows as products of matrices, each (window, steps, N).
+
+    Parameters
+    ----------
+    signature : Signature
+        Delays and scales.
+    groups : sequence of Windows
+        What is read.
+    run : callable
+        Runs of batches of standardised states, delayed and direct regressors.
+    """
+    batches = []
     for windows in groups:
         steps = windows.steps
-        driving = windows.delayed[:, windows.delayed.shape[1] - own.input_delays - steps :]
+        driving = windows.delayed[:, windows.delayed.shape[1] - signature.input_delays - steps :]
         if not driving.shape[2]:
             driving = driving[:, :steps]
-        history = own.state_scale.deviations(windows.histories[:, -1 - own.state_delays :])
-        direct = own.direct_scale.deviations(windows.direct)
-        batches.append((history, own.input_scale.deviations(driving), direct))
-    computed = rollouts(*member.matrices, batches, n_states=len(own.state_labels))
+        history = signature.state_scale.deviations(
+            windows.histories[:, -1 - signature.state_delays :]
+        )
+        direct = signature.direct_scale.deviations(windows.direct)
+        batches.append((history, signature.input_scale.deviations(driving), direct))
+    computed = run(batches)
     with undefined():  # a run that is lost is cut just below
         for windows, values in zip(groups, computed, strict=True):
-            cut_lost(own.state_scale.physical(values, out=values), own, windows)
+            cut_lost(signature.state_scale.physical(values, out=values), signature, windows)
     return computed
 
 

@@ -147,8 +147,6 @@ def with_means(
     settings: HankelSettings, states: Sequence[FloatArray], direct: Sequence[FloatArray]
 ) -> list[FloatArray]:
     """Direct regressors of each run, and the means over blocks of its delayed states."""
-    if not settings.blocks:
-        return [*direct]
     return [
         np.concatenate([own, block_means(x, settings.blocks)], axis=1)
         for own, x in zip(direct, states, strict=True)
@@ -419,8 +417,6 @@ def run_regressors(
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
     rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
-    if not missing:
-        return rows
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
@@ -488,10 +484,8 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def _stops_by_run(stop: Stop, names: list[str]) -> dict[str, Any]:
+def _stops_by_run(stop: Any, names: list[str]) -> dict[str, Any]:
     """Last instant of each run's window as the user gave it; None for the run's end."""
-    if stop is None:
-        return dict.fromkeys(names)
     if isinstance(stop, Mapping):
         unknown = [name for name in stop if name not in names]
         if unknown:
@@ -501,7 +495,7 @@ def _stops_by_run(stop: Stop, names: list[str]) -> dict[str, Any]:
             )
         return {name: stop.get(name) for name in names}
     if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = list(cast("list[Any]", stop))
+        values = list(stop)
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
