@@ -18,6 +18,7 @@ __all__ = [
     "SeakeepError",
     "SeakeepWarning",
     "did_you_mean",
+    "quiet",
     "wanted",
     "warn",
 ]
@@ -73,6 +74,14 @@ def naming(place: str) -> Iterator[None]:
         raise type(error)(f"{place}: {error}") from None
 
 
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Give no SeakeepWarning of what is done within."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)
+        yield
+
+
 def warn(message: str) -> None:
     """Give a SeakeepWarning whose place is the line outside seakeep that led to it."""
     level, frame = 1, sys._getframe()
@@ -82,11 +91,6 @@ def warn(message: str) -> None:
 
 
 _WITHIN = ("seakeep", "functools", "contextlib")
-
-
-def quietly() -> "warnings.catch_warnings[None]":
-    """Ignore the SeakeepWarnings of what is done within."""
-    return warnings.catch_warnings(action="ignore", category=SeakeepWarning)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

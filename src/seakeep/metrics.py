@@ -30,7 +30,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray, fraction, undefined
 from seakeep.core import metrics as core
 from seakeep.core.bootstrap import block_length, bootstrap_indices, student_interval
-from seakeep.errors import RequestError, quietly
+from seakeep.errors import RequestError, quiet
 from seakeep.pairing import Paired, pair
 
 __all__ = [
@@ -171,7 +171,7 @@ def _block(p: FloatArray, m: FloatArray) -> int:
         parts = np.sqrt(square / variance) * (error / square - apart / variance)
     parts = np.where(np.isfinite(parts), parts, 0.0).sum(axis=-1)
     series = parts.reshape(-1, p.shape[-2]).mean(axis=0)
-    with quietly():  # few blocks widen the interval
+    with quiet():  # few blocks widen the interval
         return 1 if np.ptp(series) == 0 else block_length(series, "politis_white")
 
 

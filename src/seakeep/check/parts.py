@@ -10,7 +10,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
-from seakeep.errors import DataError, RequestError, SeakeepError, quietly, warn
+from seakeep.errors import DataError, RequestError, SeakeepError, quiet, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, nearest_sample, run_step
 from seakeep.models.observables import at_once
@@ -217,7 +217,7 @@ def beside(
     """Free runs of baselines over those of a model; one that lacks a run is left out."""
     others = {}
     for label, each in (baselines or {}).items():
-        with quietly(), suppress(DataError):
+        with quiet(), suppress(DataError):
             others[label] = free_runs(each, runs, free, label, own)
     return {label: of for label, of in others.items() if of.keys() == own.keys()}
 

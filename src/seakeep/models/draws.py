@@ -25,7 +25,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.core.embedding import History
-from seakeep.errors import DataError, quietly
+from seakeep.errors import DataError, quiet
 from seakeep.models.inputs import InputMap
 from seakeep.models.priors import unit_of
 from seakeep.models.settings import HankelSettings
@@ -155,7 +155,7 @@ def _draw_member(
         }
         if refused := _out_of_range(own, shared.history):
             continue
-        with quietly():  # given when the priors were made
+        with quiet():  # given when the priors were made
             settings = replace(shared, **own)
         lengths = drawn.get("window", np.nan), drawn["state_delays"], drawn["input_delays"]
         draw = Draw(settings, lengths, redrawn=redrawn)
@@ -237,7 +237,7 @@ def draws_of(dataset: xr.Dataset, shared: HankelSettings) -> tuple[Draw, ...]:
     rows = zip(*columns, strict=True)
     drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)
     members = []
-    with quietly():  # given when the priors were made
+    with quiet():  # given when the priors were made
         for lengths, (ridge, window, s, z, run, last, redrawn) in zip(drawn, rows, strict=True):
             length, number, end = (None if each < 0 else each for each in (window, run, last))
             settings = replace(shared, ridge=ridge, window=length, state_delays=s, input_delays=z)

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, whole_number
-from seakeep.errors import SHOWN, DataError, RequestError, quietly
+from seakeep.errors import SHOWN, DataError, RequestError, quiet
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR
@@ -450,7 +450,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             for out in inner
         ] or [(halves, list(runs))]
         errors: dict[HankelDMDc, list[float]] = {each: [] for each in (*every, *varying)}
-        with quietly():
+        with quiet():
             for (training, judged), each in itertools.product(folds, errors):
                 model = each._fitted(dict(training), states, inputs, ())
                 for name in judged:

@@ -23,7 +23,7 @@ from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.density import jsd_intervals
 from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
-from seakeep.errors import DataError, SeakeepError, quietly, warn
+from seakeep.errors import DataError, SeakeepError, quiet, warn
 from seakeep.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -480,8 +480,7 @@ def _channel_densities(
     channel, forecasts, measured = item
     variants = {}
     try:
-        with quietly():
-            # Caps of the block length and coarse grids: the table prints the length.
+        with quiet():  # the table prints the block length
             for variant, choice in VARIANTS.items():
                 variants[variant] = jsd_intervals(
                     forecasts,
