@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from seakeep.arrays import FloatArray, undefined
+from seakeep.arrays import FloatArray
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
 from seakeep.conventions import (
     MOTIONS,
@@ -157,7 +157,7 @@ Seas = Mapping[str, Sea]
 """By run."""
 
 
-@undefined()
+@np.errstate(over="ignore", invalid="ignore")
 def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
     series = {f: f.series(wave.column) for f in files if f.logger == wave.logger}

@@ -28,7 +28,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress, undefined
+from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.core import metrics
 from seakeep.core.embedding import spread_means, training_window
 from seakeep.core.gram import PrimalSystem, ridge_path
@@ -181,7 +181,7 @@ def scores_of(runs: FreeRuns) -> FloatArray:
     None counts worse than ``WORST``.
     """
     predicted, measured, spread = runs
-    with undefined():
+    with np.errstate(over="ignore", invalid="ignore"):
         errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
     judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
     errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from seakeep.arrays import ArrayLike, BoolArray, FloatArray, as_series, undefined, whole_number
+from seakeep.arrays import ArrayLike, BoolArray, FloatArray, as_series, whole_number
 from seakeep.signals.calculus import autoregression, continued
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed
@@ -200,7 +200,7 @@ class Jumps:
         first, second, third, a, b, c, squares, weight = self.memory
         for age in (a, b, c):
             age += 1
-        with undefined():
+        with np.errstate(over="ignore"):
             away = sample - first * (b * c) / ((b - a) * (c - a))
             away -= second * (a * c) / ((a - b) * (c - b)) + third * (a * b) / ((a - c) * (b - c))
             away = np.abs(6.0 / (a * b * c) * away)
@@ -210,7 +210,7 @@ class Jumps:
         # Jumps count too, but not for all that they are: what has become rougher is soon usual.
         beside = ((c == 3) | jumps) & np.isfinite(sample) & np.isfinite(self.least)
         self.memory[6:] *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
-        with undefined():
+        with np.errstate(over="ignore"):
             squares += np.where(beside, np.minimum(away, 0.5 * JUMP * usual) ** 2, 0.0)
         weight += beside
         newer = np.array([sample, first, second, np.zeros(sample.size), a, b])
