@@ -347,7 +347,7 @@ class Problem:
                 starts = new[windows.steps]
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
                 # Read-outs are learnt from departures.
-                found.append((starts, *windows.departing(measured, data.zeros[run])))
+                found.append((starts, *windows.departing(measured, data.zero(run))))
             for old in list(self.read)[: len(self.read) - LAST + 1]:
                 self.read.pop(old, None)
             self.read[key] = found

@@ -91,6 +91,10 @@ class TrainingData:
     inputs: tuple[FloatArray, ...] = ()
     zeros: tuple[FloatArray, ...] = ()
 
+    def zero(self, run: int) -> FloatArray | float:
+        """What the states of a run depart from, physical units."""
+        return self.zeros[run] if self.zeros else 0.0
+
     def begin(self, run: int) -> float:
         """Instant of the first sample of a run's arrays, s."""
         return self.instants[run][0] - self.windows[run].first * self.signature.dt
@@ -265,7 +269,7 @@ def _standardised(
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
     names, series, windows, instants = zip(*pieces, strict=True)
-    zeros = (np.zeros(len(labels[0])),) * len(names)
+    zeros: tuple[FloatArray, ...] = ()
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
     # A look-ahead leaves the last row, which is no column, without regressors.
