@@ -196,7 +196,7 @@ def test_a_sea_that_departs_from_training_is_forecast_on(history, expected):
     one, zero = np.ones(1), np.zeros(1)
     scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 1.2))
     before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
-    windows = Windows((), 9, (), before, nothing, nothing, predicted=(0,))
+    windows = Windows(9, before, nothing, nothing, predicted=(0,))
     parts = np.full((3, 1, 1, 9, 1), -3.0)
     weigh_members(windows, parts, errors, scale)
     assert_allclose(parts[0, 0, 0, :, 0], expected)
