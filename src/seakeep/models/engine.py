@@ -462,14 +462,16 @@ def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Fo
     Positions are NaN where none is known. Without a run they are those of training, if the model
     takes raw probes.
     """
-    places: Sequence[float | None] = (None,)
+    places: tuple[float | None, ...] = (None,)
     depth = math.nan
     if (alignment := signature.input_map.alignment) is not None:
         if run is not None or signature.input_map.follows is not None:
             _, places, depth = alignment.rig(run)
     elif run is not None:
-        depth = float(run.attrs.get("water_depth", math.nan))
-        places = [run[name].attrs.get("x_position") for name in signature.inputs]
+        stated = [run.attrs.get("water_depth")]
+        stated += [run[name].attrs.get("x_position") for name in signature.inputs]
+        numbers = [float(x) if isinstance(x, int | float | np.number) else math.nan for x in stated]
+        depth, places = numbers[0], tuple(numbers[1:])
     known = np.array(places, dtype=float)  # None becomes NaN
     positions = np.where(math.isnan(depth), math.nan, known)
     return partial(foresee, dt=signature.dt, positions=positions, depth=depth)

@@ -41,8 +41,8 @@ class _Stated:
         name, stated = type(self).__name__, dict(vars(self))
         given = [*stated.values()]
         read = [parse_length(each) if isinstance(each, str) else each for each in given]
-        units = {getattr(each, "unit", "") for each in read}
-        values = [getattr(each, "value", each) for each in read]
+        units = {each.unit if isinstance(each, Length) else "" for each in read}
+        values = [each.value if isinstance(each, Length) else each for each in read]
         if len(units) > 1:
             raise RequestError(
                 f"{name} needs one unit; received {' and '.join(map(repr, given))}. Write 'T', for "
