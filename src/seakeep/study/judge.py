@@ -102,11 +102,11 @@ def judge(
             "differences": difference_table(test, groups["training"], rng),
             **band_tables(test, groups.get("calibration"), settings.statistics.level),
             "trend": trend_table(test, groups["training"], random_stream(seed, f"trend.{name}")),
-            "response": regular_response(groups, name) if is_regular(groups, name) else None,
         }
+        if is_regular(groups, name):
+            of_test["response"] = regular_response(groups, name)
         for key, each in of_test.items():
-            if each is not None:
-                tables[key][name] = each
+            tables[key][name] = each
     out = {
         key: xr.concat(list(of.values()), xr.Variable("test", list(of)), join="outer")
         for key, of in tables.items()
