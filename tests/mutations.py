@@ -248,7 +248,7 @@ CHANGES = {
         ("(error / square - apart / variance)", "(error / square)", "test_metrics.py::test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says"),
     ],
     "models/alignment.py": [
-        ("at = surge[first:stop] + rig.offsets[column]", "at = rig.offsets[column] - surge[first:stop]", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
+        ("carrier.at(surge[read] + offset,", "carrier.at(offset - surge[read],", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
         ("offset + (trained - here)", "offset + (here - trained)", "models/test_alignment.py::test_a_probe_that_was_moved_and_says_so_changes_nothing"),
@@ -285,7 +285,7 @@ CHANGES = {
         ("lost[part.start : number] = first", "lost[: len(members)] = first", "models/test_ensemble.py::test_members_that_diverge_say_when"),
         ("farthest <= _excess(signature, windows)", "farthest <= 1.0", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
-        ("first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
+        ("slice(span.known + 1 - signature.state_samples", "slice(span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
         ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
         ("[:, -reference:].mean(axis=1)", "[:, -1:].mean(axis=1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
         ("zero[:, follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
