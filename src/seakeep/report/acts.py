@@ -328,18 +328,12 @@ class Claims(Evidence):
     def _against_irregular(self) -> Judged:
         both = self.among(*SEA, *REGULAR)
         sizes = [test.sizes["window"] for test in both.tests]
-        regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)[None]
-
-        def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
-            averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
-            ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
-            return ours / sea
-
+        is_regular = np.repeat([False, *[True] * len(REGULAR)], sizes)[:, None]
         differences = {}
         for key, words in HEADING.items():
             cells = both.cells((), key)
-            labels = np.broadcast_to(regular, cells.shape[:2])
-            differences[words] = both.interval(ratio, cells, labels)
+            parts = (np.where(part, cells, np.nan) for part in (is_regular, ~is_regular))
+            differences[words] = both.interval(_ratio(_median), *parts)
         return _changes(differences), all_of(
             [differences["ANRMSE"].above(1.0), differences["NAMMAE"].below(1.0)]
         )
