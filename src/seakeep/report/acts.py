@@ -361,8 +361,8 @@ class Claims(Evidence):
         return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
 
     def _stable(self) -> Judged:
-        both = (self.variant("radius", each) for each in ("ridge", "none"))
-        ours, none = (self.interval(_middle, each) for each in both)
+        radii = (self.variant("radius", each) for each in ("ridge", "none"))
+        ours, none = (self.interval(_middle, each) for each in radii)
         words = f"spectral radius {ours.text()} with λ, {none.text()} without"
         return words, all_of([ours.below(1.0), none.above(1.0)])
 
@@ -414,7 +414,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         drawing("acts", acts_figure, results),
         replace(short, note=f"{short.note} {still_water(results)}"),
         more=(finding(results), against_filter(results), NOTE),
-        points=[f"{act.title}. {act.sentence}" for act in _played(results)],
+        points=[f"{act.title}. {act.sentence}" for act, _ in _played(results)],
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each)),
     )
@@ -423,7 +423,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         sections.append(section("claims", claims_table(results)))
     divergence = divergence_table(first, "bayesian", "paper")
     title = "Divergence of the densities, beside the paper's"
-    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
+    links = [(f"{act.name}/report.html", act.title) for act, _ in _played(results)]
     sections += [
         section("channels", acts_table(results)),
         Section("densities", title, tables=(divergence,)),
@@ -433,8 +433,8 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
 
 
-def _played(results: Results) -> list[Act]:
-    return [act for act in ACTS if act.name in results]
+def _played(results: Results) -> list[tuple[Act, StudyResult]]:
+    return [(act, results[act.name]) for act in ACTS if act.name in results]
 
 
 def short_table(results: Results) -> Table:
@@ -456,8 +456,7 @@ def short_table(results: Results) -> Table:
         for act, model, said in (*WORDS["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
-    first = results[last]
-    seas = [*map(first.sea_of, first.tests)]
+    seas = map(results[last].sea_of, results[last].tests)
     return table("short", rows, columns=("model", *seas))
 
 
@@ -479,14 +478,11 @@ def finding(results: Results) -> str:
 
 def against_filter(results: Results) -> str:
     """How the error differs between models and the filter beside them, in one sentence."""
-    parts = []
-    for act in _played(results):
-        at = (
-            results[act.name]
-            .groups["statistics/differences"]
-            .sel(test=SEA[0], model=SINGLE, other="fir", measure="nrmse", channel="average")
-        )
-        parts.append(f"{ratio_of(at).change()} in {act.letter}")
+    at = {"test": SEA[0], "model": SINGLE, "other": "fir", "measure": "nrmse", "channel": "average"}
+    parts = [
+        f"{ratio_of(result.groups['statistics/differences'].sel(at)).change()} in {act.letter}"
+        for act, result in _played(results)
+    ]
     return (
         "From the filter with the same data, look-ahead and input map (FIR, its length and λ "
         "chosen by validation) to the single model, the median error there changes by "
@@ -525,17 +521,12 @@ def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
 
 def acts_table(results: Results) -> Table:
     """Median errors of every model of every act, per sea, of wave-frequency and slow channels."""
-    first = next(iter(results.values()))
-    rows = [
-        (act.letter, model_words(model), *chain(*_pairs(results[act.name], model)))
-        for act in _played(results)
-        for model in results[act.name].models
-    ]
-    seas = [*map(first.sea_of, first.tests)]
-    conditions = [
-        f"{act.letter}:{words}"
-        for act in _played(results)
-        if (words := conditional(results[act.name], results[act.name].models))
-    ]
+    rows, conditions, seas = [], [], []
+    for act, result in _played(results):
+        seas = [*map(result.sea_of, result.tests)]
+        for model in result.models:
+            rows.append((act.letter, model_words(model), *chain(*_pairs(result, model))))
+        if words := conditional(result, result.models):
+            conditions.append(f"{act.letter}:{words}")
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
     return table("acts", rows, more=" ".join(conditions), columns=columns)

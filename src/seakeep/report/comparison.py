@@ -53,13 +53,10 @@ def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
             if key in at
         ]
         yield _by_channel(at, "comparison", title, columns, _note(at))
-        bounds = [
-            [f"{head}, 95 %", *(interval(one, key) for one in entries(at, "channel")), of_all]
-            for head, key, of_all in (
-                ("NRMSE", "nrmse", interval(at, "anrmse")),
-                ("NAMMAE", "nammae", interval(at, "mean_nammae")),
-            )
-        ]
+        bounds = []
+        for key, mean in (("nrmse", "anrmse"), ("nammae", "mean_nammae")):
+            each = (interval(one, key) for one in entries(at, "channel"))
+            bounds.append([f"{key.upper()}, 95 %", *each, interval(at, mean)])
         yield _by_channel(at, "intervals", "intervals over blocks of the forecast", bounds)
         yield _extremes(at, "extremes")
 
@@ -157,9 +154,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     """
     if not np.isfinite(table["all_anrmse"]).any():
         return "No model could be judged."
-    first, ratios = table["model"].values[0], {}
-    for at in entries(table.sortby("all_anrmse"), "model"):  # what cannot be judged comes last
-        ratios[at["model"].item()] = ratio_of(at, "all_").cells()
+    first, ordered = table["model"].values[0], table.sortby("all_anrmse")  # not judged: last
+    ratios = {at["model"].item(): ratio_of(at, "all_").cells() for at in entries(ordered, "model")}
     name = next(iter(ratios))
     said = f"Least error: {name}, ANRMSE {number(table['all_anrmse'].min())}"
     if name != first:

@@ -92,9 +92,8 @@ def write_quality_sheet(
         for name, path in pictures.items()
     }
     page = folder / "quality.html"
-    title = f"Data quality: {title}"
-    content = {"title": title, "stamp": {}, "sections": sections, "drawn": drawn, "files": False}
-    write_text(page, rendered("report.html", kind=SHEET, **content))
+    content = {"stamp": {}, "sections": sections, "drawn": drawn, "files": False}
+    write_text(page, rendered(kind=SHEET, title=f"Data quality: {title}", **content))
     return [page, *pictures.values()]
 
 

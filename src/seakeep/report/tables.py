@@ -398,6 +398,11 @@ def band_verdict(inside: float, level: float) -> str:
     return "far too little" if inside < level - 0.2 else "not what it claims"
 
 
+def with_minus(text: str) -> str:
+    """Text whose negative numbers have the sign of minus."""
+    return re.sub(r"(?<![\w)])-(?=\d)", "−", text)
+
+
 def plain_cell(text: str) -> str:
     """Text that no spreadsheet takes for a formula: an apostrophe stands before it.
 
@@ -406,11 +411,9 @@ def plain_cell(text: str) -> str:
     >>> plain_cell("=1+1"), plain_cell("-0.5"), plain_cell("heave")
     ("'=1+1", '-0.5', 'heave')
     """
-    if not text.startswith(("=", "+", "-", "@", "\t", "\r")):
-        return text
-    if re.match(r"[+-]?(\d|\.\d|inf|nan)", text) and not re.search(r"[=(!|]", text):
-        return text
-    return text if text in ("-", MISSING) else f"'{text}"
+    is_number = re.match(r"-\Z|[+-]?(\d|\.\d|inf|nan)", text) and not re.search(r"[=(!|]", text)
+    begins = text.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{text}" if begins and not is_number else text
 
 
 def write_csv(table: Table, path: Path) -> Path:
@@ -490,10 +493,9 @@ def latex_text(text: str) -> str:
     >>> latex_text("-0.12 [-0.3, 0.1] a-1")
     '$-$0.12 [$-$0.3, 0.1] a-1'
     """
-    text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
     known = WORDS["latex"]
     signs = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
-    return re.sub(signs, lambda match: known[match[0]], text)
+    return re.sub(signs, lambda match: known[match[0]], with_minus(text))
 
 
 def write_latex(table: Table, path: Path) -> Path:

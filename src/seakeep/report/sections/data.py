@@ -70,8 +70,8 @@ def data(result: StudyResult) -> Section:
     channels = result.groups["channels"]
     signs, runs, clocks = [], [], []
     for at in entries(channels, "name"):
-        name, use, unit, *others = row(at, "name", "use", "units", "positive", "source")
-        signs.append((result.words_of(name), use, shown_unit(unit), *others))
+        words, use, unit, *others = row(at, "long_name", "use", "units", "positive", "source")
+        signs.append((words, use, shown_unit(unit), *others))
     for name, run in result.prepared.items():
         _, span, count, kinds = run_row(name, run)
         sea = row(result.groups["runs"].sel(run=name), "sea_state")
@@ -218,10 +218,10 @@ def whole_readers(result: StudyResult) -> list[str]:
 
 def unequal_training(result: StudyResult) -> str:
     """Sentence on models that learn from different lengths of data; empty where none do."""
-    period, words = result.encounter_period, {}
-    sets = [sum(end - begin for _, begin, end in spans) for spans in training_spans(result)]
+    period, training, words = result.encounter_period, result.groups["training"], {}
+    sets = (training["end"] - training["begin"]).sum("of_run")
     for model, length in _trained_on(result).items():
-        words[model] = f"from all of a training set ({reach(np.divide(sets, period))} T̂)"
+        words[model] = f"from all of a training set ({reach(sets / period)} T̂)"
         if isinstance(length, dict):
             words[model] = f"from a part ({_prior_text(length, ' samples')})"
         elif length is not None:

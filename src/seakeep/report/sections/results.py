@@ -63,7 +63,7 @@ def summary(result: StudyResult) -> Section:
         result.attrs.get("preparation_note"),
         words_of_lost(lost) if lost else "",
         words_of_repeats(repeats) if repeats else "",
-        words if shares else "",
+        words * shares,
         test_overlap(result),
     ]
     name = "heave" if "heave" in result.channels else result.channels[0]
@@ -428,9 +428,9 @@ def regular(result: StudyResult) -> Section:
     for of_model in entries(judged, "channel", "model"):
         cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
-            offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
-            total = np.sum(np.square([offset, *others]))
-            share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
+            squares = [float(at[f"error_{key}"]) ** 2 for key in ("offset", "wave", "rest")]
+            total = sum(squares)
+            share = Number(f"{percent(squares[0] / total)} %") if total > 0 else MISSING
             cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
         rows.append(tuple(cells))
     runs = dict.fromkeys(run for test in tests for run in result.tests[test]["run"].values)
@@ -451,41 +451,36 @@ def regular(result: StudyResult) -> Section:
 
 def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
-    groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
+    if (groups := result.groups.get("statistics/bands")) is None:
+        return section("bands")
     units, three = result.groups["channels"]["units"], partial(short, digits=3)
-    level = short(100 * result.level)
-    for at in entries(groups.sel(model=result.ensembles), "model", "band") if groups else ():
+    level, tables = short(100 * result.level), []
+    for at in entries(groups.sel(model=result.ensembles), "model", "band"):
         at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
         model, band = row(at, "model", "band")
         kind = "calibrated " * (band == "calibrated")
         title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
-        name = f"bands_{band}_{model}"
         more = (infinite_bands(result, model) if kind else "") + conditional(result, [model])
-        of_parts = []
+        of_parts, of_channels = [], []
         scale = at["relative_width"] / at["width"]  # one over the measured SD
         for one in entries(at.assign(at[["winkler", "crps"]] * scale), "test", "part"):
-            inside = one["inside"]
-            if inside.isnull().all():
-                continue
-            least = inside[np.nanargmin(inside.values)]
-            named = result.words_of(least["channel"].item())
-            cells = row(one.mean("channel"), relative_width=2, winkler=2, crps=2)
-            covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
-            of_parts.append(
-                (result.label_of(*row(one, "test")), *row(one, "part"), *covered, *cells)
-            )
-        of_channels = [
-            (
-                result.label_of(test),
-                f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
-                *row(one, inside=2, relative_width=2, winkler=three, crps=three),
-            )
-            for one in entries(at.sel(part="all"), "test", "channel")
-            for test, channel in [row(one, "test", "channel")]
-        ]
-        tables.append(table("bands", of_parts, more, name=name, band=title))
-        name = f"{name}_channels"
-        tables.append(table("bands_by_channel", of_channels, more, name=name, band=title))
+            test, part = row(one, "test", "part")
+            if one["inside"].notnull().any():
+                least = one["inside"][np.nanargmin(one["inside"].values)]
+                named = f"{number(least, 2)} ({result.words_of(least['channel'].item())})"
+                average = one.mean("channel")
+                held, *scores = row(average, inside=2, relative_width=2, winkler=2, crps=2)
+                of_parts.append((result.label_of(test), part, held, named, *scores))
+        for one in entries(at.sel(part="all"), "test", "channel"):
+            test, channel = row(one, "test", "channel")
+            named = f"{result.words_of(channel)} [{units.sel(name=channel).item()}]"
+            cells = row(one, inside=2, relative_width=2, winkler=three, crps=three)
+            of_channels.append((result.label_of(test), named, *cells))
+        for key, rows, name in (
+            ("bands", of_parts, f"bands_{band}_{model}"),
+            ("bands_by_channel", of_channels, f"bands_{band}_{model}_channels"),
+        ):
+            tables.append(table(key, rows, more, name=name, band=title))
     return section("bands", *tables)
 
 
