@@ -103,12 +103,12 @@ def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any)
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key], **given}
+    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key]}
     entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
     for part in ("title", "note"):
         entry[part] = entry[part].format(**given)
     entry["note"] += more
-    return Table(rows=rows, **parts_of(Table, entry))
+    return Table(rows=rows, **parts_of(Table, entry | given))
 
 
 def parts_of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:

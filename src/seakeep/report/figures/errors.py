@@ -47,7 +47,6 @@ LOWEST = 0.8
 """Modulus at which the axis ends; what lies below dies out within a few samples."""
 
 
-@figure_style()
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
     figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
@@ -62,7 +61,6 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     return figure
 
 
-@figure_style()
 def channel_boxes(result: StudyResult, test: str) -> Figure:
     """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     figure = new_figure(8.5, 5.6)
@@ -147,7 +145,6 @@ def _draw_boxes(
         axes.set_ylim(bottom=0)
 
 
-@figure_style()
 def error_over_time_figure(result: StudyResult) -> Figure:
     """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles."""
     tests, models = list(result.tests), judged_models(result)
@@ -174,7 +171,6 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     return figure
 
 
-@figure_style()
 def density_figure(result: StudyResult, model: str) -> Figure:
     """Density of each channel, measured and predicted, each with its 95 % band."""
     data = result.groups["statistics/densities"].sel(model=model)
@@ -206,7 +202,6 @@ def density_figure(result: StudyResult, model: str) -> Figure:
     return figure
 
 
-@figure_style()
 def eigenvalue_figure(result: StudyResult) -> Figure:
     """Eigenvalues of each model of the first training set, for an ensemble those of its members."""
     figure = new_figure(8.5, 3.0)

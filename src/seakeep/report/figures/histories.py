@@ -334,7 +334,6 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     return cells
 
 
-@figure_style()
 def history_figure(
     result: StudyResult, test: str, training: int, window: int, names: Sequence[str] | None = None
 ) -> Figure:
@@ -392,7 +391,6 @@ def _standard(at: xr.Dataset, values: Any) -> Any:
     return (np.asarray(values) - float(at["training_mean"])) / float(at["training_std"])
 
 
-@figure_style()
 def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
     """Channels as measured (columns) in one window of irregular waves, act by act (rows)."""
     acts = [act for act in ACTS if act.name in results and not act.without_drift]
@@ -475,7 +473,6 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     return figure
 
 
-@figure_style()
 def spectrum_figure(result: StudyResult) -> Figure:
     """Mean spectrum of the irregular runs of a study, and the frequencies of the regular ones."""
     spectra, runs = result.groups["spectra"], result.groups["runs"]

@@ -163,8 +163,7 @@ def _prior_text(prior: dict[str, Any], unit: str) -> str:
     lengths = {"T": " T̂", "s": " s"}
     for kind, words in (("uniform", "uniform, "), ("log_uniform", "log-uniform, "), ("fixed", "")):
         if kind in prior:
-            given = prior[kind] if isinstance(prior[kind], list) else [prior[kind]]
-            texts = [str(each).partition(" ") for each in given]
+            texts = [str(each).partition(" ") for each in np.atleast_1d(prior[kind])]
             bounds = " to ".join(f"{float(each[0]):.6g}" for each in texts)
             return words + bounds + lengths.get(texts[0][2], unit)
     if "distribution" in prior:

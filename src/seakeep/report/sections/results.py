@@ -172,12 +172,10 @@ def difference_table(result: StudyResult, test: str) -> Table:
     for model in others:
         pairs = [ratio_of(at.sel(model=model, measure=key)).cells() for key in HEADING]
         rows.append((model_words(model), *chain(*pairs)))
-    heads = [f"{key}: {part}" for key in HEADING.values() for part in ("change", "95 %", "verdict")]
     return table(
         "differences",
         rows,
         conditional(result, result.models),
-        columns=("model", *heads),
         name=f"differences_{test}",
         test=result.label_of(test),
         first=model_words(first),
