@@ -17,7 +17,6 @@ from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
     WORDS,
-    Interval,
     Number,
     Table,
     entries,
@@ -26,6 +25,7 @@ from seakeep.report.tables import (
     numbers,
     percent,
     probability,
+    ratio_of,
     row,
     short,
     table,
@@ -129,8 +129,8 @@ def _verdict(one: xr.Dataset) -> tuple[float, str]:
 
 def _change(one: xr.Dataset, baseline: str) -> Number:
     """Interval of the change from a baseline."""
-    at = one.sel(model=baseline)
-    return Interval(*(1 + float(at[f"change{end}"]) for end in ("", "_lower", "_upper"))).cells()[1]
+    at = one.sel(model=baseline).rename(change_lower="lower", change_upper="upper")
+    return ratio_of(at).cells()[1]
 
 
 def _by_run(result: xr.Dataset, one: str) -> Table:

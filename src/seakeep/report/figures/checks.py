@@ -172,7 +172,7 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     words = [
         f"{period:.3g} s, {ratio:.3f}" if np.isfinite(period) else f"decays in {time:.3g} s"
         for period, ratio, time in zip(
-            *(at[key].values for key in ("period", "damping_ratio", "decay_time")), strict=True
+            at["period"], at["damping_ratio"], at["decay_time"], strict=True
         )
     ]
     figure, (place,) = panels(axes, 1, 1, (2.8 + 0.5 * len(states), 0.9 + 0.24 * len(words)))
@@ -346,9 +346,8 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
         for kind, at in kinds.items():
             if at[y].notnull().any():
                 place.plot(at[x], at[y], linestyle="none", label=kind, **TESTS[kind])
-        for run, *spot in zip(*(beyond[key].values for key in ("run", x, y)), strict=True):
-            if np.isfinite(spot).all():
-                place.annotate(run, spot, (6, 4), textcoords="offset points", fontsize=7)
+        for run, *spot in beyond[[x, y]].to_dataframe()[[x, y]].dropna().itertuples():
+            place.annotate(run, spot, (6, 4), textcoords="offset points", fontsize=7)
         place.set(xlabel=across, ylabel=up)
         place.margins(x=0.15)
         place.set_ylim(0, 1.2 * float(result[y].max()))

@@ -182,11 +182,10 @@ def density_figure(result: StudyResult, model: str) -> Figure:
     figure, places = panels(None, len(result.channels), 4, (2.125, 1.75))
     for axes, name in zip(places, result.channels, strict=True):
         curves = data.sel(channel=name)
-        x, weight = curves["value"].values, curves["measured_mean"].values
-        centre = np.average(x, weights=weight)
-        spread = np.sqrt(np.average((x - centre) ** 2, weights=weight))
-        z = (x - centre) / spread
-        highest = np.fmax(curves["measured_upper"].values, curves["predicted_upper"].values)
+        weighted = curves["value"].weighted(curves["measured_mean"])
+        spread = weighted.std()
+        z = (curves["value"] - weighted.mean()) / spread
+        highest = np.fmax(curves["measured_upper"], curves["predicted_upper"])
         seen = z[highest > 1e-3 * highest.max()]  # of all models, one may have run away
         axes.set_xlim(seen[0], seen[-1])
         for key, words, tint, dash in sides:
@@ -272,8 +271,7 @@ def error_figure(table: xr.Dataset) -> Figure:
     figure = new_figure(max(4.5, 1.5 + 0.9 * len(labels)), 3.4)
     axes = figure.subplots()
     _draw_points(axes, table, "model", "anrmse", labels)
-    finite = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
-    if finite.size and 0.0 < 10.0 * finite.min() < finite.max():
+    if 0.0 < 10.0 * table["anrmse"].min() < table["anrmse"].max():
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0.0)

@@ -2,7 +2,6 @@
 
 import base64
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from seakeep.models.labelled import nearest_sample
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
+from seakeep.report.tables import entries, row
 from seakeep.study import StudyResult
 
 MISSING = 65535
@@ -63,8 +63,9 @@ def explorer(result: StudyResult) -> Section:
     test, training, window = cells[0]
     channels, waves = (
         [
-            {"name": name, "label": result.words_of(name), "unit": shown_unit(unit)}
-            for name, (_, unit) in _units(result, group)
+            {"name": name, "label": label, "unit": shown_unit(displayed(unit)[1])}
+            for at in entries(result.groups["channels"].sel(name=group), "name")
+            for name, label, unit in [row(at, "name", "long_name", "units")]
         ]
         for group in (result.channels, _elevations(result))
     )
@@ -128,20 +129,15 @@ def _elevations(result: StudyResult) -> list[str]:
     return list(filter(is_elevation, result.groups["channels"]["name"].values))
 
 
-def _units(result: StudyResult, names: list[str]) -> Iterator[tuple[str, tuple[float, str]]]:
-    """Channels, each with the factor to the unit in which it is shown, and that unit."""
-    units = result.groups["channels"]["units"].sel(name=names)
-    return zip(names, map(displayed, units.values), strict=True)
-
-
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
     """A cell, packed: waves, motions, bands and errors."""
     at, models = result.tests[test].isel(training=training, window=window), {}
-    factors = [factor for _, (factor, _) in _units(result, result.channels)]
+    units = result.groups["channels"]["units"].sel(name=result.channels).values
+    factors = np.array([displayed(unit)[0] for unit in units])
 
     def packed(values: xr.DataArray) -> list[dict[str, Any]]:
         """Values (time, channel) in the units that are shown, packed channel by channel."""
-        return [pack(factor * each) for factor, each in zip(factors, values.values.T, strict=True)]
+        return [pack(each) for each in (factors * values.values).T]
 
     for model in judged_models(result):
         parts = {"mean": at["mean"].sel(model=model)}
