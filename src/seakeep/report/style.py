@@ -101,7 +101,7 @@ def panels(
         for spare in every[count:]:
             spare.remove()
         return figure, every[:count]
-    given = np.ravel(np.array(axes, dtype=object)).tolist()
+    given = np.ravel([axes]).tolist()
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "

@@ -16,6 +16,7 @@ from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
 from seakeep.report.tables import entries, row
 from seakeep.study import StudyResult
+from seakeep.study.judge import window_spans
 
 MISSING = 65535
 
@@ -86,10 +87,7 @@ def explorer(result: StudyResult) -> Section:
             "label": result.label_of(name),
             "steps": data.sizes["time"],
             "training": data["training"].values.tolist(),
-            "windows": [
-                f"{run} from {start:.1f} s"
-                for run, start in zip(data["run"].values, data["start"].values, strict=True)
-            ],
+            "windows": [f"{run} from {start:.1f} s" for run, start, _ in window_spans(data)],
             "judged": data["judged"].values.astype(int).tolist(),
         }
         for name, data in result.tests.items()
