@@ -6,7 +6,6 @@ Table of the margins of a calibrated band.
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +31,7 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
+    shorter,
     write_frame,
 )
 
@@ -72,10 +72,10 @@ def _by_channel(
     at: xr.Dataset, name: str, title: str, columns: Iterable[Iterable[str]], note: str = ""
 ) -> Table:
     """A row per channel of a run, and one of averages where columns have it; headings first."""
-    run, names = at["run"].values, ["channel", *map(str, at["channel"].values)]
-    every = list(map(list, columns))
-    averages = range(len(names) - 1, len(every[0]) - 1)
-    heads, *rows = zip([*names, *["average"] * len(averages)], *every, strict=True)
+    run, names = at["run"].values, [*map(str, at["channel"].values)]
+    # Columns without an average end before its row.
+    heads, *rows = zip(["channel", *names, "average"], *columns, strict=False)
+    averages = range(len(names), len(rows))
     return Table(f"{name}_{run}", f"{run}: {title}", heads, rows, note, averages=averages)
 
 
@@ -131,7 +131,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     if len(runs) > 1:
         of = f"{len(runs)} runs"
         rows = [
-            (*row(at, "run", wave_period=partial(short, digits=3)), *numbers(at["anrmse"]))
+            (*row(at, "run", wave_period=shorter), *numbers(at["anrmse"]))
             for at in entries(table.sortby("wave_period"), "run")
         ]
         rows.append(("mean", "", *numbers(table["all_anrmse"])))

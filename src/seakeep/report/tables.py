@@ -175,6 +175,10 @@ def short(value: SupportsFloat, digits: int = 4) -> Number:
     return Number(f"{value:.{digits}g}") if np.isfinite(value) else MISSING
 
 
+shorter = partial(short, digits=3)
+"""Text of a number of three significant digits."""
+
+
 def small_number(value: SupportsFloat) -> Number:
     """Text of a number of four decimals, or as many more as two digits of it need.
 
@@ -322,7 +326,7 @@ class Interval(NamedTuple):
         words = {True: "better", False: "worse", None: "cannot tell"}[self.below(1.0)]
         if max(abs(self.lower - 1.0), abs(self.upper - 1.0)) < 0.005:
             words = "as good"
-        form, unit = (TIMES, "times") if self.is_multiple else (_relative, "%")
+        form, unit = (shorter, "times") if self.is_multiple else (_relative, "%")
         texts = (to(ratios, form) for ratios in (self[:1], self[1:]))
         value, bounds = (each if each == MISSING else Number(f"{each} {unit}") for each in texts)
         return value, bounds, words
@@ -335,7 +339,7 @@ class Interval(NamedTuple):
         >>> Interval(0.8, 0.7, 1.2).change(), Interval(4.4, 1.9, 9.0).change()
         ('-20 % [-30, +20]', '4.4 times [1.9, 9]')
         """
-        return self.text(TIMES, " times") if self.is_multiple else self.growth()
+        return self.text(shorter, " times") if self.is_multiple else self.growth()
 
     def growth(self) -> Number:
         """Text of a ratio as a relative change, in percent."""
@@ -364,9 +368,6 @@ def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:
         return MISSING
     places = 1 - int(np.floor(np.log10(both[1]))) if both[1] > 0 else 6
     return Number(" ± ".join(numbers([round(each, places) for each in both], max(places, 0))))
-
-
-TIMES = partial(short, digits=3)
 
 
 def _relative(ratio: SupportsFloat) -> Number:
@@ -454,7 +455,7 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
     for block in blocks:
         left, each = max(room(block), 0), RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for k in block:
-            more = min(left, max(max(map(len, columns[k])) - least[k], 0))
+            more = min(left, max(map(len, columns[k])) - least[k])
             left -= more
             side: JustifyMethod = "right" if k in table.numbers else "left"
             each.add_column(columns[k][0], justify=side, width=least[k] + more, overflow="fold")

@@ -104,7 +104,7 @@ def settings(result: StudyResult) -> Section:
     ]
     statistics = {**result.settings["statistics"], "calibrate": result.is_calibrated}
     every = result.settings | {"statistics": statistics, "models": None}
-    stated = [(key, setting_text(key, value)) for key, value in _leaves("", every)]
+    stated = [(key, setting_text(key, value)) for key, value in _leaves(every)]
     windows, training = [], result.groups["training"]
     for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):
         words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
@@ -127,12 +127,12 @@ def settings(result: StudyResult) -> Section:
     )
 
 
-def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _leaves(f"{prefix}.{key}" if prefix else key, inner)
-    elif value not in (None, "", []):
-        yield prefix, value
+def _leaves(tables: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{prefix}{key}.")
+        elif value not in (None, "", []):
+            yield f"{prefix}{key}", value
 
 
 def setting_text(key: str, value: Any) -> str:

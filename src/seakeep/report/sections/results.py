@@ -46,6 +46,7 @@ from seakeep.report.tables import (
     reach,
     row,
     short,
+    shorter,
     signed,
     small_number,
     table,
@@ -310,7 +311,7 @@ def plain_symbol(channel: str) -> str:
     known = canonical_channel(channel)
     if known is None:
         return channel.replace("_", " ")
-    text = re.sub(r"\\mathrm\{([^}]*)\}|\\mathrm ?(\w+)", r"\1\2", known.symbol)
+    text = re.sub(r"\\mathrm\{([^}]*)\}", r"\1", known.symbol)
     greek = r"\\(theta|phi|psi|eta)"
     text = re.sub(greek, lambda m: unicodedata.lookup(f"GREEK SMALL LETTER {m[1]}"), text)
     return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
@@ -451,8 +452,8 @@ def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     if (groups := result.groups.get("statistics/bands")) is None:
         return section("bands")
-    units, three = result.groups["channels"]["units"], partial(short, digits=3)
-    level, tables = short(100 * result.level), []
+    units, tables = result.groups["channels"]["units"], []
+    level = short(100 * result.level)
     for at in entries(groups.sel(model=result.ensembles), "model", "band"):
         at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
         model, band = row(at, "model", "band")
@@ -472,7 +473,7 @@ def bands(result: StudyResult) -> Section:
         for one in entries(at.sel(part="all"), "test", "channel"):
             test, channel = row(one, "test", "channel")
             named = f"{result.words_of(channel)} [{units.sel(name=channel).item()}]"
-            cells = row(one, inside=2, relative_width=2, winkler=three, crps=three)
+            cells = row(one, inside=2, relative_width=2, winkler=shorter, crps=shorter)
             of_channels.append((result.label_of(test), named, *cells))
         for key, rows, name in (
             ("bands", of_parts, f"bands_{band}_{model}"),
