@@ -29,6 +29,7 @@ pytest.importorskip("matplotlib")
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
+from seakeep.report.sections.data import waves
 from seakeep.report.sections.histories import histories
 
 CHANNELS = 'states = ["heave", "pitch", "heave_rate"]\ninputs = ["eta_fwd", "eta_mid"]'
@@ -243,6 +244,13 @@ def test_the_time_histories_zoom_and_choose(browser, page):
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
     assert browser.get_log("browser") == []
+
+
+def test_inputs_that_are_no_waves_have_no_table_and_no_spectrum_of_them(result):
+    without = {name: group for name, group in result.groups.items() if name != "spectra"}
+    section = waves(replace(result, groups=without))
+    assert [each.name for each in section.tables] == ["positions"]
+    assert not section.figures
 
 
 def test_lost_forecasts_are_named(result):

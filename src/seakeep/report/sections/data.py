@@ -7,7 +7,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from seakeep.models.selection import UNHELD
 from seakeep.report.figures.histories import spectrum_figure
@@ -44,10 +43,11 @@ def wave_tables(result: StudyResult) -> list[Table]:
         for name, channel in run.data_vars.items()
         if "x_position" in channel.attrs
     ]
-    frame = channels.attrs.get("frame", "")
-    spectra = result.groups.get("spectra", xr.Dataset())
+    positions = table("positions", places, frame=channels.attrs.get("frame", ""))
+    if (spectra := result.groups.get("spectra")) is None:
+        return [positions]
     rows = []
-    for at in entries(result.groups["runs"], "run") if spectra else ():
+    for at in entries(result.groups["runs"], "run"):
         (name,), sea = row(at, "run"), at["sea_state"].item() or at["waves"].item()
         frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
         known = np.isfinite(frequency + depth)
@@ -62,7 +62,7 @@ def wave_tables(result: StudyResult) -> list[Table]:
         )
         facts = (height, number(frequency), number(speed / frequency, 2), number(speed, 2))
         rows.append((name, sea, *facts, spans or "test"))
-    return [table("waves", rows, **spectra.attrs), table("positions", places, frame=frame)]
+    return [table("waves", rows, **spectra.attrs), positions]
 
 
 def data(result: StudyResult) -> Section:

@@ -319,8 +319,8 @@ def plain_symbol(channel: str) -> str:
 
 def glossary(result: StudyResult) -> Section:
     """Return terms and symbols with what they mean."""
-    symbols = {name: (plain_symbol(name), result.words_of(name)) for name in result.channels}
-    explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols.values())
+    symbols = ((plain_symbol(name), result.words_of(name)) for name in result.channels)
+    explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols)
     regular = "statistics/response" in result.groups
     same = (
         " It is that of the irregular sea and counts lengths in regular waves too: 5 T̂ may hold "
@@ -328,11 +328,10 @@ def glossary(result: StudyResult) -> Section:
     )
     if any(name.startswith("mooring_") for name in result.channels):
         explained += ". M is a mooring load, a force in N."
-    period, same = result.encounter_period, same * regular
-    slap = any("truth" in data for data in result.tests.values())
-    known = {"λ/L": regular, "slap": slap}
+    given = {"period": result.encounter_period, "same": same * regular, "symbols": explained}
+    known = {"λ/L": regular, "slap": any("truth" in data for data in result.tests.values())}
     terms = [
-        (term, meaning.format(period=period, same=same, symbols=explained))
+        (term, meaning.format(**given))
         for term, meaning in WORDS["terms"].items()
         if known.get(term, True)
     ]
@@ -603,10 +602,9 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant, channel=result.channels)
-    average = at.mean("channel", skipna=False)
     quantiles = {"mean": "EV", "lower": "q0.025", "upper": "q0.975", "uncertainty": "U"}
     own = [
-        [head, *map(small_number, at[key]), small_number(average[key])]
+        [head, *map(small_number, at[key]), small_number(at[key].mean(skipna=False))]
         for key, head in (*quantiles.items(), ("noise_floor", "noise floor"))
     ]
     own.append(["block (samples)", *numbers(at["block_length"], 0), ""])
