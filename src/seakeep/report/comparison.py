@@ -217,11 +217,10 @@ def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
             f"errors in training SD over {of_model.attrs['starts']} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"
         )
-        most = number(lead[-1])
+        most, end = Number(f"at least {number(lead[-1])}"), lead[-1] - 1e-9
         for at in entries(of_model, "run"):
-            times = zip(numbers(at["lead_time"]), at["lead_time"] >= lead[-1] - 1e-9, strict=True)
             columns = [
-                ["lead time s", *(Number(f"at least {most}") if end else t for t, end in times)],
+                ["lead time s", *(most if t >= end else number(t) for t in at["lead_time"])],
                 *([f"at {number(lead[k])} s", *numbers(at["error"].isel(lead=k))] for k in places),
                 ["in band %", *numbers(at["coverage"].mean("lead"), 0)],
             ]
