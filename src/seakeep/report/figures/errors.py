@@ -50,7 +50,7 @@ LOWEST = 0.8
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
     figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
-    labels = [wrapped(result.label_of(test)) for test in tests]
+    labels = [plain_text(wrapped(result.label_of(test))) for test in tests]
     for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
         columns = {
             model: [average_of(result.errors(test, model, measure)) for test in tests]
@@ -165,7 +165,8 @@ def error_over_time_figure(result: StudyResult) -> Figure:
             axes.set_title(words)
             axes.legend(fontsize=6.5, loc="upper left")
         row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
-        row[0].set_ylabel(f"{wrapped(result.label_of(test), WIDEST)}\nε [measured SD]")
+        label = plain_text(wrapped(result.label_of(test), WIDEST))
+        row[0].set_ylabel(f"{label}\nε [measured SD]")
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
