@@ -33,8 +33,7 @@ def channel_rows(run: xr.Dataset) -> Iterator[tuple[str, ...]]:
     findings = findings_of(run)
     for name, channel in run.data_vars.items():
         factor, unit = displayed(channel.attrs.get("units", ""))
-        values = channel.values[np.isfinite(channel.values)]
-        numbers = pd.Series(factor * values).agg(["min", "max", "mean", "std"])
+        numbers = pd.Series(factor * channel.values).agg(["min", "max", "mean", "std"])
         flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).values.astype(int)
         flagged = ", ".join(
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
