@@ -65,8 +65,10 @@ def explorer(result: StudyResult) -> Section:
     channels, waves = (
         [
             {"name": name, "label": label, "unit": shown_unit(displayed(unit)[1])}
-            for at in entries(result.groups["channels"].sel(name=group), "name")
-            for name, label, unit in [row(at, "name", "long_name", "units")]
+            for name, label, unit in (
+                row(at, "name", "long_name", "units")
+                for at in entries(result.groups["channels"].sel(name=group), "name")
+            )
         ]
         for group in (result.channels, _elevations(result))
     )

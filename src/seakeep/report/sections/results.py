@@ -526,7 +526,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
         widths = numbers(at["relative_width"].sel(against="measured"), 2)
         columns.append([f"{label}: width [SD]", *widths])
     level = result.level
-    more = _calibrated_words(result, model, level) if calibrated else ""
+    more = _calibrated_words(result, model) if calibrated else ""
     if true:
         more += (
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
@@ -546,7 +546,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     )
 
 
-def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
+def _calibrated_words(result: StudyResult, model: str) -> str:
     """How the calibrated band is made, what it rests on, and where it is of no use."""
     group = result.groups["calibration"].sel(ensemble=model)
     words = "these quantiles, moved outwards by a margin found"
@@ -574,7 +574,7 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
             f"A training set had {reach(group['windows'])} of them; allowing for their dependence, "
             f"their scores are worth {reach(group['blocks'])} independent ones. "
         )
-        if (warranted := float(group["warranted"].min())) < level:
+        if (warranted := float(group["warranted"].min())) < result.level:
             said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
     said += "The margin guarantees nothing in another kind of sea."
     return said + infinite_bands(result, model)
