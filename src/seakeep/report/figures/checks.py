@@ -22,6 +22,7 @@ from seakeep.report.style import (
     figure_style,
     legend_outside,
     panels,
+    plain_text,
     short_label,
     shown_unit,
 )
@@ -235,7 +236,7 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
             wide = float(own["input_limit"].sel(input=each["input"]))
             past.axhspan(-wide, wide, **SHADE)
             line = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": dash}
-            past.plot(own["lag"], each, **line, label=each["input"].item())
+            past.plot(own["lag"], each, **line, label=plain_text(each["input"].item()))
         past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
         past.set_title("with past inputs")
         frequency, power = own["frequency"][1:], own["measured_spectrum"].values

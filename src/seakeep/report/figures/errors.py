@@ -306,9 +306,9 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
         for number, (model, of_model) in enumerate(nowcasts.items()):
             at, style = of_model.sel(run=run, channel=name), SERIES[1 + number % (len(SERIES) - 1)]
             line = {"color": style["color"], "linestyle": style["linestyle"] if number else "-"}
-            axes.plot(at["lead"], at["error"], **line, label=f"{model}: error")
+            axes.plot(at["lead"], at["error"], **line, label=plain_text(f"{model}: error"))
             claimed = {"color": style["color"], "linewidth": 0.7, "alpha": 0.7}
-            axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
+            axes.plot(at["lead"], at["claimed"], **claimed, label=plain_text(f"{model}: claimed"))
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
         axes.set_title(short_label(name))
         axes.set(xlim=(0, first["lead"].max()), xlabel="lead time [s]")
