@@ -61,6 +61,7 @@ CHANGES = {
         ("np.abs(left[:, order] * right[:, order])", "np.abs(right[:, order] * right[:, order])", "check/test_free.py::test_modes_say_which_states_take_part"),
         ("order[values[order].imag >= 0]", "order[values[order].imag > 0]", "check/test_free.py::test_modes_say_which_states_take_part"),
         ("(amplitude**2 * (2 if apart else 1))", "(amplitude**2 * 2)", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
+        ("np.where(waves, 0.0, parts[run].inputs.mean(axis=0))", "np.zeros(len(waves))", "check/test_second_order.py::test_drift_is_counted_from_the_rest_in_the_wind_of_the_run"),
         ("samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
     ],
     "check/parts.py": [
@@ -238,7 +239,7 @@ CHANGES = {
         ("np.arange(z, -1, -1)]", "np.arange(z + 1)]", "hosts/test_onnx.py::test_a_horizon_is_that_of_forecast_arrays"),
     ],
     "hosts/templates/estimator.c": [
-        ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
+        ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
         ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
         ("row[k] += last[c] * on_states[c * M + k];", "row[k] += 0.0;", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
     ],
@@ -369,7 +370,7 @@ CHANGES = {
         ("wider = np.where(worst > ALARM, worst, 1.0)", "wider = worst", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
         ("conditions.beyond**2)", "conditions.beyond)", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("own[:] = own[np.maximum.accumulate(last)]", "own[1:] = own[:-1]", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
-        ("self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
+        ("self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
         ("min(closed.dark, self._count.unseen)", "0", "models/test_live.py::test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead"),
         ("min(closed.dark, self._count.unseen)", "closed.dark", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("if unseen > leads:", "if False:", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
@@ -433,6 +434,7 @@ CHANGES = {
         ("unseen > 0.5,", "unseen > 2.0,", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
         ("heights > margin * self.heights", "heights > 9 * margin * self.heights", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("elevations & (steepnesses > margin", "elevations & (steepnesses < margin", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),
+        ("np.abs(self.means - self.centre)", "(self.means - self.centre)", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),
         ("drifts = self.surge is not None and not", "drifts = self.surge is None and not", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
     ],
     "pairing.py": [

@@ -19,7 +19,7 @@ from seakeep.models.engine import GROWTH, fading
 from seakeep.models.growth import DOUBTED
 from seakeep.models.live import AFTER, Live
 from seakeep.models.terms import SlowSquare, Term
-from seakeep.models.validity import CYCLES, PER_OCTAVE, TRAINED
+from seakeep.models.validity import CYCLES, FAR, PER_OCTAVE, TRAINED
 from seakeep.signals.expressions import Text
 from seakeep.signals.prediction import FEWEST, JUMP, MEMORY, NOISE, OF_LATE
 from seakeep.waves import GRAVITY
@@ -150,6 +150,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
             "coverage": model.coverage,
             "trained": TRAINED,
             "cycles": CYCLES,
+            "far": FAR,
             "gravity": GRAVITY,
             "per_octave": PER_OCTAVE,
             "is_elevation": is_elevation,

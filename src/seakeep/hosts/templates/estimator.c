@@ -55,7 +55,9 @@ enum { PLACED = {{ foresight[1] | length }}, TAPS = {{ foresight[0].shape[3] }} 
 /* Waves of training: shares of energy by band, heights and steepnesses. */
 {{ array("shares", coverage.shares) -}}
 {{ array("heights", coverage.heights) -}}
-{{ array("steepnesses", coverage.steepnesses) }}
+{{ array("steepnesses", coverage.steepnesses) -}}
+{{ array("input_centre", signature.input_scale.centre[:Q]) -}}
+{{ array("input_spread", signature.input_scale.spread[:Q]) }}
 static const int elevations[] = { {% for each in signature.inputs %}{{ 1 if is_elevation(each) else 0 }}, {% endfor %}0 };
 #define TRAINED {{ trained | hex }}
 enum { BANDS = {{ coverage.shares.shape[1] }} };
@@ -570,10 +572,12 @@ int {{ name }}_validity({{ name }}_estimator *e)
         double energy[BANDS] = { 0.0 }, total = 0.0, unseen = 0.0, height, steepness, repeats, margin;
         const double *taught = shares + q * BANDS;
         int peak = 0, moves = 0;
-        if (!waves[q])
-            continue;
         for (int t = 0; t < size; t++)
             mean += input(e, t)[q] / size;
+        if (size > 8 * GAP && fabs(mean - input_centre[q]) > {{ far | hex }} * input_spread[q] && input_spread[q] > 0.0)
+            outside |= {{ upper }}_MEAN;
+        if (!waves[q])
+            continue;
         for (int t = 0; t < size; t++) {
             double away = pow(input(e, t)[q] - mean, 2.0);
             square += away / size;
