@@ -61,6 +61,7 @@ CHANGES = {
         ("np.abs(left[:, order] * right[:, order])", "np.abs(right[:, order] * right[:, order])", "check/test_free.py::test_modes_say_which_states_take_part"),
         ("order[values[order].imag >= 0]", "order[values[order].imag > 0]", "check/test_free.py::test_modes_say_which_states_take_part"),
         ("(amplitude**2 * (2 if apart else 1))", "(amplitude**2 * 2)", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
+        ("np.where(waves, 0.0, parts[run].inputs.mean(axis=0))", "np.zeros(len(waves))", "check/test_second_order.py::test_drift_is_counted_from_the_rest_in_the_wind_of_the_run"),
         ("samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
     ],
     "check/parts.py": [
@@ -229,12 +230,16 @@ CHANGES = {
     "formats/tdms.py": [
         ("first + step * np.arange(count, dtype=float)", "step * np.arange(count, dtype=float)", "formats/test_read_tdms.py::test_waveforms"),
     ],
+    "formats/text.py": [
+        ("and rows[at - 1][0] == rows[at][0] - 1:", ":", "formats/test_read_text.py::test_words_stand_above_the_header"),
+        ("and not joined[-1].startswith(_OPENED)", "", "formats/test_read_text.py::test_words_stand_above_the_header"),
+    ],
     "hosts/graph.py": [
         ("lower + part * (upper - lower)", "lower", "hosts/test_onnx.py::test_a_horizon_is_that_of_forecast_arrays"),
         ("np.arange(z, -1, -1)]", "np.arange(z + 1)]", "hosts/test_onnx.py::test_a_horizon_is_that_of_forecast_arrays"),
     ],
     "hosts/templates/estimator.c": [
-        ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
+        ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
         ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
         ("row[k] += last[c] * on_states[c * M + k];", "row[k] += 0.0;", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
     ],
@@ -244,7 +249,7 @@ CHANGES = {
         ("(error / square - apart / variance)", "(error / square)", "test_metrics.py::test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says"),
     ],
     "models/alignment.py": [
-        ("at = surge[first:stop] + rig.offsets[column]", "at = rig.offsets[column] - surge[first:stop]", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
+        ("carrier.at(surge[read] + offset,", "carrier.at(offset - surge[read],", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
         ("offset + (trained - here)", "offset + (here - trained)", "models/test_alignment.py::test_a_probe_that_was_moved_and_says_so_changes_nothing"),
@@ -281,7 +286,7 @@ CHANGES = {
         ("lost[part.start : number] = first", "lost[: len(members)] = first", "models/test_ensemble.py::test_members_that_diverge_say_when"),
         ("farthest <= _excess(signature, windows)", "farthest <= 1.0", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
-        ("first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
+        ("slice(span.known + 1 - signature.state_samples", "slice(span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
         ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
         ("[:, -reference:].mean(axis=1)", "[:, -1:].mean(axis=1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
         ("zero[:, follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
@@ -361,7 +366,7 @@ CHANGES = {
         ("wider = np.where(worst > ALARM, worst, 1.0)", "wider = worst", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
         ("conditions.beyond**2)", "conditions.beyond)", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("own[:] = own[np.maximum.accumulate(last)]", "own[1:] = own[:-1]", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
-        ("self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
+        ("self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
         ("min(closed.dark, self._count.unseen)", "0", "models/test_live.py::test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead"),
         ("min(closed.dark, self._count.unseen)", "closed.dark", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("if unseen > leads:", "if False:", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
@@ -383,8 +388,7 @@ CHANGES = {
     "models/selection.py": [
         ("widest = replace(widest, window=None)  #", "pass  #", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
         ("size - 1, widest.window, before, 0, widest.history", "size - 1, widest.window, before, 0, 'before'", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
-        ("list(self.read)[: len(self.read) - LAST + 1]", "[]", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
-        ("order = folds[::-1] if again else folds", "order = folds", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
+        ("len(self.groups) <= FEW", "True", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("key.lead != lead, near[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
         ("own_lead = 0 if candidate.follows_surge else candidate.lead", "own_lead = candidate.lead", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
         ("if each.at(each.level(alike)) <= least or (is_known", "if (True", "models/test_choice.py::test_what_is_simpler_errs_little_more"),
@@ -399,7 +403,7 @@ CHANGES = {
         ("measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])", "measured = np.stack([states[at : at + windows.steps] for at in starts])", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("if self.made[each].best <= least]", "if self.made[each].best >= least]", "models/test_choice.py::test_the_ridges_about_the_best_of_what_is_taken_are_tried"),
         ("trials.refine([taken])", "pass", "models/test_choice.py::test_the_ridges_about_the_best_of_what_is_taken_are_tried"),
-        ("places[places > near[-1]]", "places[places > near[0]]", "models/test_choice.py::test_the_ridges_about_the_best_are_tried"),
+        ("tried[tried > near[-1]]", "tried[tried > near[0]]", "models/test_choice.py::test_the_ridges_about_the_best_are_tried"),
         ("return self.widest.lead - candidate.lead", "return 0", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
         ("if made[taken].is_as_good_as(made[other]):", "if False:", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("own = {\"ridge\"} if", "own = {\"lead\"} if", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
@@ -422,10 +426,11 @@ CHANGES = {
     ],
     "models/validity.py": [
         ("period = 2.0 * seconds / crossings", "period = seconds / crossings", "models/test_slow.py::test_the_period_of_a_slow_drift_is_found"),
-        ("periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])", "periods = np.sqrt(edges[:-1] * edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
+        ("1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])", "np.sqrt(self.edges[:-1] * self.edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
         ("unseen > 0.5,", "unseen > 2.0,", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
         ("heights > margin * self.heights", "heights > 9 * margin * self.heights", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("elevations & (steepnesses > margin", "elevations & (steepnesses < margin", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),
+        ("np.abs(self.means - self.centre)", "(self.means - self.centre)", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),
         ("drifts = self.surge is not None and not", "drifts = self.surge is None and not", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
     ],
     "pairing.py": [
@@ -454,7 +459,7 @@ CHANGES = {
     ],
     "report/acts.py": [
         ('("mean", "mean"), ("lower", "upper"), ("upper", "lower")', '("mean", "mean"), ("mean", "mean"), ("mean", "mean")', "report/test_claims.py::test_loads_diverge_more_by_the_ends_of_both_intervals"),
-        ('[differences["ANRMSE"].above(1.0)', '[differences["ANRMSE"].below(1.0)', "report/test_claims.py::test_regular_waves_are_compared_with_irregular_ones"),
+        ("[nrmse.above(1.0), nammae", "[nrmse.below(1.0), nammae", "report/test_claims.py::test_regular_waves_are_compared_with_irregular_ones"),
         ("all_of([ours.below(1.0), none.above(1.0)])", "all_of([ours.below(1.0), none.below(1.0)])", "report/test_claims.py::test_the_ridge_is_judged_against_none_and_truncation"),
         ("all_of([own.below(USEFUL), worst < 1.0])", "all_of([fir.below(USEFUL), worst < 1.0])", "report/test_claims.py::test_errors_decide"),
         ("e.below(1 + AGED), e.above(1 - AGED)", "e.below(1 + AGED), e.below(1 + AGED)", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
@@ -466,7 +471,7 @@ CHANGES = {
         ("return False if False in known else None if None in known else True", "return None if None in known else True", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
         ("svd / ours", "ours / svd", "report/test_claims.py::test_the_ridge_is_judged_against_none_and_truncation"),
         ("dry.upper + SLACKER < wet.lower", "wet.upper + SLACKER < dry.lower", "report/test_claims.py::test_the_error_of_the_stern_line_falls_as_it_is_less_slack"),
-        ('{words: _share(self, key, LOADS)', '{words: _share(self, key, SLOW[:1])', "report/test_claims.py::test_errors_decide"),
+        ("(_share(self, key, LOADS)", "(_share(self, key, SLOW[:1])", "report/test_claims.py::test_errors_decide"),
     ],
     "report/tables.py": [
         ('1.0 + float(at[f"{prefix}{key}"])', '1.0 - float(at[f"{prefix}{key}"])', "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),

@@ -28,8 +28,8 @@ ComplexArray = npt.NDArray[np.complex128]
 
 Progress = Callable[[int, int, str], None]
 """Takes how many steps are done, how many there are, and the name of one."""
-undefined = partial(np.errstate, divide="ignore", invalid="ignore")
-"""Lets 0/0 be NaN and x/0 infinite without a warning."""
+undefined = partial(np.errstate, divide="ignore", invalid="ignore", over="ignore")
+"""Lets 0/0 be NaN, and x/0 and what is too large infinite, without a warning."""
 TINY = float(np.finfo(float).tiny)
 """Least number above zero."""
 Datasets: TypeAlias = "Mapping[str, xr.Dataset]"

@@ -218,7 +218,7 @@ _SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "%": "perc
 _SPELLINGS = {
     r"(?<=[A-Za-z°])(-?[1-9])": r"^\1",
     r"\^": "**",
-    r"(?<=[A-Za-z°0-9])[ .](?=[A-Za-z°])": "*",
+    r"(?<=[A-Za-z°0-9])[ .-](?=[A-Za-z°])": "*",  # kN-m, as OpenFAST writes it
 }
 
 

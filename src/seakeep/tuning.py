@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Progress
+from seakeep.arrays import Datasets, Progress, plain
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, write_text
 from seakeep.models import HankelDMDc
@@ -21,7 +21,7 @@ from seakeep.models.baselines import RIVALS
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
 from seakeep.models.readouts import readouts_json
 from seakeep.models.selection import Selected, select
-from seakeep.models.settings import FOLDS, Folds, HankelSettings
+from seakeep.models.settings import FOLDS, Folds, HankelSettings, Select
 from seakeep.models.specs import largest_radius
 from seakeep.models.training import check_names, until
 from seakeep.toml import Length
@@ -186,14 +186,15 @@ def tune(
         asked = [spec.to_json(), sorted(vary), list(horizon), folds]
         known = _Scores(Path(resume), _digest(asked, named, [*states, *inputs]))
     spec, given = spec.resolved_in(named, inputs), (named, list(states), list(inputs))
+    open_to = spec.select or Select()
     found = select(
         spec,
         *given,
         vary=vary,
-        opened=spec.select.opened if spec.select else (),
+        opened=open_to.opened,
         horizon=horizon,
         folds=folds,
-        period=spec.select.period if spec.select else None,
+        period=open_to.period,
         kinds=RIVALS if "kind" in vary else (),
         executor=executor,
         progress=progress,
@@ -338,12 +339,11 @@ def _choice(
 
 def _stated(settings: Any, *always: str) -> dict[str, Any]:
     """Settings that differ from their defaults, and those that are stated always."""
-    values = {each.name: getattr(settings, each.name) for each in fields(settings)}
-    differs = {each.name for each in fields(settings) if values[each.name] != each.default}
+    default = {each.name: each.default for each in fields(settings)}
     return {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in values.items()
-        if key in {*always, *differs}
+        key: plain(value)
+        for key, value in vars(settings).items()
+        if key in always or value != default[key]
     }
 
 

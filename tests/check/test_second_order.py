@@ -39,6 +39,22 @@ def test_drift_of_a_square_is_its_own():
     assert str(found.units[0].values) == "m/m²"
 
 
+def test_drift_is_counted_from_the_rest_in_the_wind_of_the_run():
+    def blown(run, mean):
+        wind = mean + np.sin(2.0 * np.arange(run.time.size))
+        moved = signal.lfilter([0.0, 0.5], [1.0, -MEMORY], wind)
+        run = run.assign(wind=run.eta.copy(data=wind), surge=run.surge + moved)
+        return run.isel(time=slice(300, None))  # settled
+
+    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
+    model = spec.fit(blown(drifting_run(), 4.0), ["surge"], ["eta", "wind"])
+    regular = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
+    found = check.drift(model, {"regular": blown(regular, 7.0)})
+    law = 0.5 * GAIN / (1.0 - MEMORY)
+    assert found.slow_response.values[0, 0] == pytest.approx(law, rel=1e-4)  # the ridge
+    assert found.offset[0, 0] == pytest.approx(law, rel=1e-2)  # windows of whole periods
+
+
 def test_slow_squares_answer_by_their_filter():
     observable = SlowSquares("eta", orders=(0,), cutoff=1 / 3, lags=(0,), lead=1.5)
     spec = HankelDMDc(0, 0, 1e-6, delay_rows="exact", observables=(observable,))

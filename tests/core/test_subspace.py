@@ -54,7 +54,7 @@ def test_a_known_system_is_recovered_and_forecast_to_rounding(inputs):
     outputs = np.stack([y[2][k - 12 : k + 1] for k in starts])
     driving = np.stack([u[2][k - 12 : k + 100] for k in starts])
     expected = np.stack([y[2][k + 1 : k + 101] for k in starts])
-    forecast = found.free_runs(outputs, driving, 100, np.empty((2, 100, 0)))
+    forecast = found.free_runs(outputs, driving, np.empty((2, 100, 0)))
     assert_allclose(forecast, expected, atol=1e-7)
 
 
@@ -78,7 +78,7 @@ def test_direct_inputs_drive_and_do_not_tell_the_past():
     y = simulate((a, b, c), u)
     found = fitted([y[:400]], [u[:400, :2]], direct=[u[:400, 2:]])
     # Without the past of the third input the filter estimates the state, no more.
-    run = found.free_runs(y[None, 408:421], u[None, 408:490, :2], 70, u[None, 420:490, 2:])[0]
+    run = found.free_runs(y[None, 408:421], u[None, 408:490, :2], u[None, 420:490, 2:])[0]
     late = y[451:491]
     assert np.sqrt(np.mean((run[30:] - late) ** 2)) < 0.05 * late.std()
 
@@ -90,6 +90,6 @@ def test_an_input_that_tells_its_own_future_needs_a_ridge_and_forecasts_with_it(
     u += 1e-3 * np.random.default_rng(7).normal(size=u.shape)
     y = simulate(system, u, noise=1e-3)
     found = fitted([y[:1200]], [u[:1200]], ridge=1e-6)
-    run = found.free_runs(y[None, 1488:1501], u[None, 1488:1800], 300, np.empty((1, 300, 0)))[0]
+    run = found.free_runs(y[None, 1488:1501], u[None, 1488:1800], np.empty((1, 300, 0)))[0]
     error = np.sqrt(np.mean((run - y[1501:1801]) ** 2)) / y.std()
     assert error < 0.02

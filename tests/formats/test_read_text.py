@@ -69,6 +69,16 @@ def test_blanks(tmp_path):
     assert_array_equal(run["Pitch"], [-2, 2])
 
 
+@pytest.mark.parametrize("mark", [" ", "\t"])
+def test_words_stand_above_the_header(tmp_path, mark):
+    table = "Time Heave Pitch WP\n(s) (mm) (kN-m) (-)\n0 1.5 -2 3\n0.1 1 2 4\n"
+    text = f"Made by a program, on a day: no 7\n of four words here\n\n{table.replace(' ', mark)}"
+    run = read_table(write(tmp_path, text, "run.out"))
+    units = {str(name): each.attrs.get("units") for name, each in run.items()}
+    assert units == {"Heave": "mm", "Pitch": "kN-m", "WP": "-"}
+    assert_array_equal(run["Pitch"], [-2, 2])
+
+
 def test_options(tmp_path):
     text = "made by a logger\nRecord 7\n! remark\nclock|heave\n".replace("|", ";") + "0;1\n50;2\n"
     options = FileSettings(skip_rows=2, comment="!", time="clock", time_unit="ms", delimiter=";")

@@ -211,7 +211,7 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     assert_allclose(found.forecast(30, plan)[1], expected, rtol=1e-7, atol=1e-9)
 
 
-def test_an_input_that_is_no_wave_is_not_judged(library, model, make_run, tmp_path):
+def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(library, model, make_run, tmp_path):
     wave = (Estimator(library, "exact"), model.live())
     constant = beside_a_constant(model, tmp_path)
     u, y = measured(make_run(COUNT, 5), model, False)
@@ -222,6 +222,10 @@ def test_an_input_that_is_no_wave_is_not_judged(library, model, make_run, tmp_pa
     assert outside == [live.conditions.validity for _, live in (wave, constant)]
     assert outside[0] & Validity.HEIGHT
     assert outside[1] == 0
+    for found, live in (wave, constant):
+        for at in range(300):
+            found.beside(live, u[at] + [0, 30], y[at])
+        assert found.validity & live.conditions.validity & Validity.MEAN
 
 
 def test_a_probe_that_stands_still_is_predicted_to(library, model):
@@ -284,9 +288,13 @@ def test_it_runs_clean_under_sanitizers_without_a_heap(sources, library, model, 
 def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_path):
     case = cases["following"]
     model, library = case.model, built(case.model, tmp_path)
-    for factor, slow, away in ((1, False, 0), (2.5, False, 0), (1, True, 0), (1, False, 9)):
+    still = (1, False, 0, 0)
+    for factor, slow, away, zero in (
+        *(still, (2.5, False, 0, 0), (1, True, 0, 0)),
+        *((1, False, 9, 0), (1, False, 0, -9), (1, False, 0, 9)),
+    ):
         found, live = Estimator(library, "rom"), model.live()
-        u, y = table(case.run, model.inputs), table(case.run, model.states)
+        u, y = zero + table(case.run, model.inputs), table(case.run, model.states)
         if slow:  # a swell of 0.24 Hz
             u[:] = 0.02 * np.sin(0.15 * np.arange(len(u)))[:, None]
         for at in range(300):
@@ -294,7 +302,8 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_pat
             found.beside(live, factor * u[at], place)
         validity = live.conditions.validity
         assert found.validity == validity
-        assert bool(validity) == ((factor, slow, away) != (1, False, 0))
+        assert bool(validity) == ((factor, slow, away, zero) != still)
+        assert (Validity.MEAN in validity) == bool(zero)
 
 
 @pytest.mark.usefixtures("errors_of_training")

@@ -175,7 +175,7 @@ def test_where_waves_are_known_nothing_is_weighed(model):
 def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     one, zero = np.ones(1), np.zeros(1)
     scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 9.0))
-    windows = Windows((), 9, (), *np.zeros((3, 1, 1, 1)), predicted=(3,))
+    windows = Windows(9, *np.zeros((3, 1, 1, 1)), predicted=(3,))
     parts = np.full((3, 2, 1, 9, 1), 5.0)  # of two members, the last one's departure
     parts[:, 0] = -3.0
     if lost is None:  # a member whose departure is lost counts with the others
@@ -196,7 +196,7 @@ def test_a_sea_that_departs_from_training_is_forecast_on(history, expected):
     one, zero = np.ones(1), np.zeros(1)
     scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 1.2))
     before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
-    windows = Windows((), 9, (), before, nothing, nothing, predicted=(0,))
+    windows = Windows(9, before, nothing, nothing, predicted=(0,))
     parts = np.full((3, 1, 1, 9, 1), -3.0)
     weigh_members(windows, parts, errors, scale)
     assert_allclose(parts[0, 0, 0, :, 0], expected)

@@ -8,6 +8,7 @@ from free_runs import loop_score
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 
+from seakeep import SlowSquares
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
 from seakeep.core import embed
 from seakeep.errors import RequestError
@@ -136,6 +137,14 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
     window = dataclasses.replace(spec, window=250)
     few = [window.fit(run, STATES, INPUTS) for run in (given[0], other)]
     assert_array_equal(few[0].coefficients, few[1].coefficients)
+    # Also where an observable counts in periods of the runs.
+    counts, states = (
+        dataclasses.replace(window, observables=(SlowSquares(INPUTS, period=each, lead=0.0),))
+        for each in (None, period)
+    )
+    models = [each.fit(given, STATES, INPUTS) for each in (counts, states)]
+    assert models[0].settings.ridge == models[1].settings.ridge
+    assert_allclose(models[0].coefficients, models[1].coefficients, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["fir", "arx", "subspace"])

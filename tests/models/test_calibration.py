@@ -162,8 +162,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
     # By hand: the same settings fitted anew on the other runs, which none of them has read.
     judged = [
         held_out(
-            {name: pooled("all", {key: each for key, each in runs.items() if key != name})},
-            {name: run},
+            {name: (pooled("all", {key: each for key, each in runs.items() if key != name}), run)},
             40,
             0.95,
         )[name]
@@ -195,8 +194,8 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
     for begin, end in ((0, 300), (300, 600), (600, 900)):
         rest = {"before": run.isel(time=slice(0, begin)), "after": run.isel(time=slice(end, None))}
         ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
-        part = {"part": run.isel(time=slice(begin, end))}
-        judged.append(held_out({"part": ensemble}, part, 40, 0.95)["part"])
+        part = run.isel(time=slice(begin, end))
+        judged.append(held_out({"part": (ensemble, part)}, 40, 0.95)["part"])
     assert_learnt(found, judged)
     count = (300 - ensemble.history_samples) // 40
     assert found.windows == {f"a, part {number}": count for number in (1, 2, 3)}

@@ -113,19 +113,19 @@ def test_the_ridges_about_the_best_of_what_is_taken_are_tried(monkeypatch):
     assert [*levels.values()] == [every[::4]] * 3
 
 
-def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch):
+@pytest.mark.parametrize("count", [selection.FEW, selection.FEW + 1])
+def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch, count):
     made = []
     read_groups, problem = selection.read_groups, selection._problem
     monkeypatch.setattr(selection, "read_groups", lambda *a: made.append(1) or read_groups(*a))
     kept = []
     monkeypatch.setattr(selection, "_problem", lambda *a: kept.append(problem(*a)) or kept[-1])
-    given = {f"{n}": next(iter(runs().values())).assign_attrs(run=f"{n}") for n in range(5)}
+    given = {f"{n}": next(iter(runs().values())).assign_attrs(run=f"{n}") for n in range(count)}
     choice = {"vary": ("observables",), "folds": "run", "horizon": (10.0,)}
     select(replace(SPEC, select=None), given, ["heave"], INPUTS, **choice)
     (one,) = kept
-    assert len(one.read) == selection.LAST
-    # Rounds go back and forth, and the runs where they turn are read once.
-    assert len(made) < 2 * 5 + 5
+    assert len(one.read) == (count if count == selection.FEW else 0)
+    assert (len(made) == count) == (count == selection.FEW)
     for each in one.read.values():
         for starts, windows, measured in each:
             assert len(windows) == len(starts) == len(measured)

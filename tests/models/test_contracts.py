@@ -130,6 +130,9 @@ def test_higher_waves_and_a_drift_are_outside(tmp_path):
     (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
     assert told == "a mean surge of -3 m, upstream of the trained -1 to 1 m"
     assert outside_training(model, 1.5 * run, 20.0, 90) == []  # four waves are no sea
+    words = "eta: a mean of 1.5 m, trained from -1.41 to 1.41 m (mean and 2 SD)"
+    for away, expected in ((1.3, []), (1.5, [words])):
+        assert outside_training(model, run.assign(eta=run.eta + away), 20.0, 192) == expected
 
 
 def test_a_forecast_says_by_how_much_and_reads_its_own_surge():

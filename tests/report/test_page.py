@@ -26,9 +26,11 @@ from seakeep.study import read_result, read_study, run_study
 pytest.importorskip("matplotlib")
 
 
+from seakeep.report.figures.errors import average_boxes, error_over_time_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
+from seakeep.report.sections.data import waves
 from seakeep.report.sections.histories import histories
 
 CHANNELS = 'states = ["heave", "pitch", "heave_rate"]\ninputs = ["eta_fwd", "eta_mid"]'
@@ -243,6 +245,20 @@ def test_the_time_histories_zoom_and_choose(browser, page):
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
     assert browser.get_log("browser") == []
+
+
+def test_a_dollar_in_a_label_starts_no_formula(result):
+    named = changed(result, tests={"unseen": {"label": "1 $_ or 2 $"}})
+    (tick,) = average_boxes(named, ["unseen"]).axes[0].get_xticklabels()
+    assert tick.get_text() == r"1 \$_ or 2 \$"
+    assert error_over_time_figure(named).axes[0].get_ylabel().startswith(r"1 \$_ or 2 \$")
+
+
+def test_inputs_that_are_no_waves_have_no_table_and_no_spectrum_of_them(result):
+    without = {name: group for name, group in result.groups.items() if name != "spectra"}
+    section = waves(replace(result, groups=without))
+    assert [each.name for each in section.tables] == ["positions"]
+    assert not section.figures
 
 
 def test_lost_forecasts_are_named(result):

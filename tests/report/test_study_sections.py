@@ -35,7 +35,7 @@ def result():
         names, time, measured=measured, judged=[[True]], training_std=[[8.0, 0.5]],
         lower=lower[None], upper=upper[None], error=[errors], run=["short"],
     )  # fmt: skip
-    settings = {"tests": {"t": {"label": "regular, λ/L 1.5"}}, "statistics": {"level": 0.95}}
+    settings = {"tests": {"t": {"label": "regular, {λ/L} 1.5"}}, "statistics": {"level": 0.95}}
     channels = xr.Dataset(
         {"units": ("name", ["m", "N"]), "long_name": ("name", ["heave", "stern line"])},
         coords={"name": names, "channel": names},
@@ -186,9 +186,9 @@ def test_errors_in_regular_waves_are_taken_apart_and_a_slack_line_is_named(resul
     )
     section = regular(with_group(result, "statistics/response", response))
     (table,) = section.tables
-    assert table.columns[2:] == (
-        "λ/L 1.5: amplitude", "λ/L 1.5: phase [°]", "λ/L 1.5: offset [SD]", "λ/L 1.5: share"
-    )  # fmt: skip
+    assert table.columns[2:] == [
+        f"{{λ/L}} 1.5: {part}" for part in ("amplitude", "phase [°]", "offset [SD]", "share")
+    ]
     assert table.rows[0] == ("heave", "m", "0.90", "-5", f"{0.4 * size:.2f}", share)
     assert "stern line in 51 % of short." in section.words[0]
 

@@ -10,12 +10,14 @@ from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     HERTZ,
     driven,
+    elevations,
     gathered,
     is_regular,
     read_off,
     reference_probe,
     single_model,
     units_of,
+    used_parts,
     wave_turns,
 )
 from seakeep.check.response import measured_response, transfer
@@ -223,7 +225,8 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         Over (state, difference, frequency): ``slow_response`` (in ``units`` over state, per m²),
         at difference 0 the mean; ``phase`` (degrees, against the wave group at the reference
         probe); over (point, state): ``offset`` and ``offset_uncertainty`` of regular runs,
-        per amplitude squared, counted from the model's rest in still water, with ``run`` and
+        per amplitude squared, counted from the model's rest in still water where all but the waves
+        is as in the run, with ``run`` and
         ``point_frequency``. ``attrs``: ``amplitude`` (m) and ``reference``.
 
     Raises
@@ -240,7 +243,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
             "the model has no observables, so that its mean and slow response do not depend on the "
             "waves. Fit one with observables = [seakeep.SlowSquares(…)] for drift."
         )
-    reference = reference_probe(model, runs)
+    reference, waves = reference_probe(model, runs), elevations(model)
     samples = round(PERIODS * mean_period(runs, model.inputs))
     step = 1.0 / (samples * model.dt)
     every = np.arange(1, int(0.4 / model.dt / step))
@@ -250,12 +253,12 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     bins = known[np.linspace(0, known.size - 1, min(PROBED, known.size)).round().astype(int)]
     turns = wave_turns(model, runs, step * np.arange(bins[-1] + DIFFERENCES + 1), reference)
     if turns is None:
-        if len(model.inputs) > 1:
+        if waves.sum() > 1:
             raise DataError(
                 "the runs do not state the positions of the probes and the water depth, by which "
                 "waves pass several probes. State them in [rig]."
             )
-        turns = np.zeros((bins[-1] + DIFFERENCES + 1, 1))
+        turns = np.tile(np.where(waves, 0.0, np.nan), (bins[-1] + DIFFERENCES + 1, 1))
     amplitude = float(np.sqrt(2) * single.input_scale.spread[reference])
     differences = step * np.arange(DIFFERENCES + 1, dtype=float)
     slow = transfer(model, single.dynamics, differences)
@@ -263,10 +266,10 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     forces = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
     for number, first in enumerate(bins):
         for apart in range(DIFFERENCES + 1):
-            waves = np.unique([first, first + apart])[:, None, None]
-            turn = 2 * np.pi * waves * np.arange(samples)[:, None] / samples
+            pair = np.unique([first, first + apart])[:, None, None]
+            turn = 2 * np.pi * pair * np.arange(samples)[:, None] / samples
             # Inputs that are not elevations are zero.
-            elevation = amplitude * np.nan_to_num(np.cos(turn - turns[waves[:, 0]]))
+            elevation = amplitude * np.nan_to_num(np.cos(turn - turns[pair[:, 0]]))
             rows = _columns(single, elevation.sum(axis=0)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
             forces[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
@@ -274,11 +277,18 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     # Offsets of regular runs from the model's rest, per amplitude squared.
     offsets: dict[str, Any] = {}
     if regular := {name: run for name, run in runs.items() if is_regular(run)}:
-        at = measured_response(model, regular)
+        at, parts = measured_response(model, regular), used_parts(model, regular)
         means = np.concatenate([single.input_scale.mean, single.signature.direct_scale.mean])
-        rest = single.state_mean + slow[0].real @ (still[0] - means)
+
+        def rest(run: str) -> FloatArray:
+            calm = np.where(waves, 0.0, parts[run].inputs.mean(axis=0))
+            columns = _columns(single, np.tile(calm, (samples, 1)))[0]
+            moved: FloatArray = single.state_mean + slow[0].real @ (columns - means)
+            return moved
+
         square = at["wave_amplitude"].values[:, None] ** 2
-        offset = at["offset"].values + single.state_scale.centre - rest
+        rests = np.stack([rest(str(run)) for run in at["run"].values])
+        offset = at["offset"].values + single.state_scale.centre - rests
         offsets = {
             "offset": (("point", "state"), offset / square),
             "offset_uncertainty": (("point", "state"), at["offset_uncertainty"].values / square),

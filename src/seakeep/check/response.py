@@ -25,6 +25,7 @@ from seakeep.check.parts import (
     used_parts,
     wave_turns,
 )
+from seakeep.conventions import is_elevation
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import cross_spectra, segment_length
@@ -144,7 +145,7 @@ def response(
             "frequency": ("frequency", frequency, HERTZ),
             "units": (("state", "input"), units),
         },
-        attrs={"reference": waves[-1]},
+        attrs={"reference": (list(filter(is_elevation, waves)) or waves)[-1]},
     )
     out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
     return out

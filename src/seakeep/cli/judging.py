@@ -444,7 +444,8 @@ def check(
     from seakeep.check import check_model
     from seakeep.models import load_model
     from seakeep.models.forecasts import counted
-    from seakeep.report.check_page import check_sections, write_check
+    from seakeep.report.check_page import check_sections
+    from seakeep.report.page import write_page
     from seakeep.study import fit_baselines
     from seakeep.study.fit import repeats_of
 
@@ -466,10 +467,11 @@ def check(
     with progress_bar("Checking") as progress:
         checked = check_model(identified, runs, progress, baselines)
     checked = replace(checked, repeats=repeats_of(identified, read, runs))
-    for section in check_sections(checked):
+    sections = check_sections(checked)
+    for section in sections:
         for text in (*section.points, *section.notices):
             show(f"{section.title}: {text}")
     size = f"{counted(len(channels[0]), 'state')}, {counted(len(channels[1]), 'input')}"
     words = f"{model.name}, a model of kind {identified.kind} ({size}), on {read.name}."
-    page = write_check(checked, out, f"{model.stem}: what the model is worth", words)
-    say(f"Wrote {page}.")
+    title = f"{model.stem}: what the model is worth"
+    say(f"Wrote {write_page(out, title, {'description': words}, sections)}.")

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, undefined
 from seakeep.errors import DataError, RequestError
 
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
@@ -174,7 +174,7 @@ def band_crps(
     """
     low, high, y = _triple(lower, upper, measured)
     quantile = float(special.ndtri(0.5 + 0.5 * fraction(level, "level")))
-    with np.errstate(invalid="ignore", over="ignore"):
+    with undefined():
         spread, error = (high - low) / (2.0 * quantile), np.abs(y - 0.5 * (low + high))
         z = np.divide(error, spread, out=np.zeros_like(error), where=spread > 0)
         density = np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)

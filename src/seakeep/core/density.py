@@ -49,6 +49,12 @@ def _as_grid(values: npt.ArrayLike) -> FloatArray:
     return grid
 
 
+def _is_even(grid: FloatArray) -> bool:
+    """Whether a grid has one step."""
+    steps = np.diff(grid)
+    return np.allclose(steps, steps.mean(), rtol=1e-6, atol=0.0)
+
+
 def _redrawn(series: FloatArray, positions: IntArray) -> tuple[FloatArray, IntArray]:
     """Samples in ascending order, and how often each stands in each row of positions."""
     order = np.argsort(series, kind="stable")
@@ -138,7 +144,7 @@ def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> f
 def _densities(ordered: FloatArray, times: IntArray, grid: FloatArray, h: FloatArray) -> FloatArray:
     """Densities, shape (row, grid), of the rows of :func:`_redrawn`, each with its bandwidth."""
     span, steps = grid[-1] - grid[0], grid.size - 1
-    even = np.allclose(np.diff(grid), span / steps, rtol=1e-6, atol=0.0)
+    even = _is_even(grid)
     # Bins between two grid points, of the narrowest kernel, and grid points beyond either end.
     fine = math.ceil(min(span / steps / h.min() * BINS_PER_BANDWIDTH, MOST_BINS))
     beyond = math.ceil(min(REACH * h.max() / span * steps, MOST_BINS))
@@ -249,11 +255,10 @@ def density_grid(
     """
     whole_number(points, "points", 2)
     all_of_them = [as_bundle(item, "the series") for item in series]
-    rows = (_once(each) for x in all_of_them for each in x)
-    widths = np.concatenate([_bandwidths(*row, bandwidth) for row in rows])
-    low = float(min(map(np.min, all_of_them)) - margin * widths.max())
-    high = float(max(map(np.max, all_of_them)) + margin * widths.max())
-    narrow = float(widths.min())
+    widths = [kernel_bandwidth(each, bandwidth) for x in all_of_them for each in x]
+    low = float(min(map(np.min, all_of_them)) - margin * max(widths))
+    high = float(max(map(np.max, all_of_them)) + margin * max(widths))
+    narrow = min(widths)
     step = (high - low) / (points - 1)
     if step > COARSE * narrow:
         warn(
@@ -277,8 +282,7 @@ def checked_grid(
             f"the grid runs from {points[0]:g} to {points[-1]:g} and the series from {low:g} to "
             f"{high:g}; mass outside would be lost. Use density_grid(…) of all the series."
         )
-    steps = np.diff(points)
-    if not np.allclose(steps, steps.mean(), rtol=1e-6, atol=0.0):
+    if not _is_even(points):
         raise RequestError("the grid must be evenly spaced here; use density_grid(…).")
     return points
 
@@ -287,8 +291,8 @@ def bootstrapped_densities(
     series: FloatArray, positions: IntArray, grid: FloatArray, bandwidth: Bandwidth
 ) -> FloatArray:
     """Densities of one series redrawn at the given positions."""
-    drawn, own = _redrawn(series, positions), _bandwidths(*_once(series), bandwidth)
-    return _densities(*drawn, grid, _bandwidths(*drawn, bandwidth, own[0]))
+    drawn, own = _redrawn(series, positions), kernel_bandwidth(series, bandwidth)
+    return _densities(*drawn, grid, _bandwidths(*drawn, bandwidth, own))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import FloatArray, IntArray, undefined
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +229,7 @@ def recursion(
     centre = (place.centre - place.lowest) / place.spacing
     flat, highest = np.ascontiguousarray(table.reshape(-1, n)), place.highest
     firsts, first = starts * place.count, int(starts[0]) * place.count
-    with np.errstate(over="ignore", invalid="ignore"):
+    with undefined():
         for step in range(steps):
             at, to = (steps - step) * N, (steps - 1 - step) * n + 1
             computed = product(x[..., at : at + wide], a)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import FloatArray, as_real, undefined
 from seakeep.errors import RequestError
 
 Arrays = tuple[FloatArray, ...]
@@ -134,7 +134,7 @@ def rollouts(
     out = [np.empty((0, each.steps, count)) for each in read]
     if not windows:
         return out
-    with np.errstate(over="ignore", invalid="ignore"):
+    with undefined():
         propagator = _propagator(a, matrices, count, channels, windows, steps)
         for number, each in enumerate(read):
             if len(each.start):

@@ -230,7 +230,7 @@ def autocorrelation(pieces: Sequence[FloatArray], lags: int) -> FloatArray:
     lags = min(lags, max(map(len, pieces)) - 1)
     centred = [x - x.mean(axis=0) for x in pieces]
     total = np.sum([_products(x, x, lags) for x in centred], axis=0)
-    with np.errstate(invalid="ignore"):
+    with undefined():
         return total / total[:1]
 
 
@@ -284,7 +284,7 @@ def input_correlation(
     shaped = ((r[:, :, None], v[:, None]) for r, v in zip(residuals, inputs, strict=True))
     total = np.sum([_products(*each, lags) for each in shaped], axis=0)
     of_e, of_u = (sum((part**2).sum(axis=0) for part in side) for side in (residuals, inputs))
-    with np.errstate(invalid="ignore"):
+    with undefined():
         return total / np.sqrt(np.multiply.outer(of_e, of_u)), limit
 
 

@@ -46,7 +46,6 @@ class StateSpace:
         self,
         outputs: FloatArray,
         inputs: FloatArray,
-        steps: int,
         direct: FloatArray,
     ) -> FloatArray:
         """Free runs over several windows.
@@ -57,8 +56,6 @@ class StateSpace:
             Outputs up to each start, oldest first.
         inputs : ndarray, shape (window, z + steps, Q)
             Inputs, oldest first; sample z is that of the start.
-        steps : int
-            Number of instants.
         direct : ndarray, shape (window, steps, d)
             Further inputs, from the start on, which the filter of the past does not read.
 
@@ -67,11 +64,11 @@ class StateSpace:
         ndarray, shape (window, steps, N)
             Outputs at the instants after each start.
         """
-        count, delays = len(outputs), inputs.shape[1] - steps
+        count, delays = len(outputs), inputs.shape[1] - direct.shape[1]
         past = [outputs[:, ::-1].reshape(count, -1), inputs[:, :delays][:, ::-1].reshape(count, -1)]
         start = np.concatenate(past, axis=1) @ self.filter.T
         driving = np.concatenate([inputs[:, delays:], direct], axis=2)
-        after = rollout(self.A, self.B, start, driving, n_states=len(self.A))
+        after = rollout(self.A, self.B, start, driving)
         states = np.concatenate([start[:, None], after[:, :-1]], axis=1)
         return states @ self.C.T + driving @ self.D.T
 

@@ -26,6 +26,7 @@ SHORT_END = 100
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z", re.ASCII)
 _MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
+_OPENED = "[", "("
 _NO_THOUSANDS = re.compile(r"(?<!\d)0\d*,|(?<!\d),|\d{4},|,(?!\d{3}(?!\d))", re.ASCII)
 """A comma that divides no thousands: behind a zero or four digits, or not before three digits."""
 _RULE = re.compile(
@@ -124,6 +125,7 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
         for number, line in enumerate(lines[options.skip_rows :], options.skip_rows + 1)
         if line.strip(" \t,;") and not line.lstrip().startswith(marks)
     ]
+    rows = _below_words(rows, options.delimiter)
     text = next((line for _, line in rows[:HEAD] if not _RULE.match(line)), None)
     if not text:
         raise DataError(
@@ -163,6 +165,16 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
     decimal = options.decimal or _decimal(path, [line for _, line in rows[at:]], delimiter)
     return _Layout(delimiter, decimal, headers, units, rows[at:])
+
+
+def _below_words(rows: list[tuple[int, str]], delimiter: str | None) -> list[tuple[int, str]]:
+    """Rows from the header on: the lines right above the numbers that have as many cells."""
+    cells = [_cells(line, delimiter or _delimiter(line)) for _, line in rows[:HEAD]]
+    at = first = next((i for i, each in enumerate(cells) if _numeric(each)), 0)
+    while at and len(cells[at - 1]) == len(cells[first]) and rows[at - 1][0] == rows[at][0] - 1:
+        at -= 1
+    is_header = at < first and _units(cells[at], cells[at]) is None
+    return rows[at:] if is_header else rows
 
 
 def _decimal(path: Path, body: list[str], delimiter: str) -> str:
@@ -209,7 +221,9 @@ def _cells(line: str, delimiter: str) -> list[str]:
         for token in next(csv.reader([line.strip()], delimiter=" ", skipinitialspace=True)):
             # "Heave [m]": a unit that stands behind a blank belongs to the name before it.
             opened = joined and joined[-1].count("[") > joined[-1].count("]")
-            if joined and (token.startswith(("[", "(")) or opened):
+            # In a row of units each is a cell of its own.
+            behind = token.startswith(_OPENED) and joined and not joined[-1].startswith(_OPENED)
+            if behind or opened:
                 joined[-1] += f" {token}"
             elif token:
                 joined.append(token)

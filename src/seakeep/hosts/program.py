@@ -139,7 +139,5 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
                 f"{', '.join(names)} that the model starts from: {at - first} before it and "
                 f"{max(stop - at - 1, 0)} after it. Choose an instant further inside the run."
             )
-        values = labelled.channel_matrix(run, names, name, slice(first, stop))
-        labelled.check_finite(values, names, run, name, first)
-        rows.append(values)
+        rows.append(labelled.sound_matrix(run, names, name, slice(first, stop)))
     return rows[0], rows[1]

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Literal, NamedTuple, Self
 
 import numpy as np
@@ -34,12 +33,12 @@ from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.labelled import Span
 from seakeep.signals.propagation import (
-    CarriedElevation,
     band_limit,
     carry_by_celerity,
     carry_by_dispersion,
     effective_celerity,
 )
+from seakeep.signals.time_axis import stretches
 from seakeep.waves import group_speed
 
 Mode = Literal["effective", "dispersion"]
@@ -330,13 +329,13 @@ class FittedAlignment:
 
     def rig(self, run: xr.Dataset | None = None) -> Rig:
         """Offsets, positions and depth of a run; what it does not state is as in training."""
-        places, attrs, depth = self.positions, {}, self.water_depth
-        if run is not None:
-            stated = zip(
-                (_position(run, each) for each in self.inputs), self.positions, strict=True
-            )
-            places = tuple(trained if here is None else here for here, trained in stated)
-            attrs, depth = run.attrs, run.attrs.get("water_depth", depth)
+        attrs = {} if run is None else run.attrs
+        stated = [None if run is None else _position(run, each) for each in self.inputs]
+        places = tuple(
+            trained if here is None else here
+            for here, trained in zip(stated, self.positions, strict=True)
+        )
+        depth = attrs.get("water_depth", self.water_depth)
         offset = self.settings.offset + float(attrs.get("probe_offset", 0.0))
         offsets = [
             offset if trained is None or here is None else offset + (trained - here)
@@ -371,32 +370,21 @@ class FittedAlignment:
                 labelled.check_finite(known, channel, run, name, span.first)
             every = np.concatenate([surge[span.first : span.stop] for span in spans])
             reach = float(every.min()), float(every.max())
-        elevations = np.flatnonzero(self.carried)
-
-        @cache
-        def carriers(begin: int, end: int) -> list[CarriedElevation]:
-            out = []
-            for column in elevations:
+        out, elevations = values.copy(), np.flatnonzero(self.carried)
+        out[:, elevations] = np.nan
+        wanted = np.zeros(len(values), dtype=bool)
+        for span in spans:
+            wanted[span.first : span.stop] = True
+        for begin, end in stretches(np.all(np.isfinite(values), axis=1)):
+            read = begin + np.flatnonzero(wanted[begin:end])
+            for column in elevations if read.size else ():
                 series, offset = values[begin:end, column], rig.offsets[column]
                 given = series, dt, (reach[0] + offset, reach[1] + offset)
                 if settings.mode == "effective":
-                    out.append(carry_by_celerity(*given, self._speed(run)))
+                    carrier = carry_by_celerity(*given, self._speed(run))
                 else:
-                    out.append(carry_by_dispersion(*given, rig.depth, self.highest_frequency))
-            return out
-
-        gaps = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
-        out = values.copy()
-        out[:, elevations] = np.nan
-        wanted = np.zeros(last + 2, dtype=bool)
-        for span in spans:
-            wanted[span.first + 1 : span.stop + 1] = True
-        for first, stop in np.flatnonzero(np.diff(wanted)).reshape(-1, 2).tolist():
-            begin = int(max(gaps[gaps < first], default=-1)) + 1
-            end = int(min(gaps[gaps >= stop], default=len(values)))
-            for column, carrier in zip(elevations, carriers(begin, end), strict=True):
-                at = surge[first:stop] + rig.offsets[column]
-                out[first:stop, column] = carrier.at(at, slice(first - begin, stop - begin))[:, 0]
+                    carrier = carry_by_dispersion(*given, rig.depth, self.highest_frequency)
+                out[read, column] = carrier.at(surge[read] + offset, read - begin)[:, 0]
         return out
 
 

@@ -18,11 +18,11 @@ from seakeep.core.embedding import History
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
-from seakeep.models.engine import Windows, cut_lost
+from seakeep.models.engine import Windows, open_runs
 from seakeep.models.forecasts import Model, counted
 from seakeep.models.growth import LeadErrors, lead_errors, stretches_of, weighed_runs
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
+from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
@@ -168,9 +168,10 @@ class LinearSpec(LinearKind, Plain):
             return HankelDMDcModel.fitted(spec, data, solution, named)
         read = named = until(named, stop)
         if spec.window is not None:  # what the model reads, and no more
-            dt = common_step(named)
-            reach = spec.needs(dt, mean_period(named, inputs) * dt).history + spec.window
-            read = {name: run.isel(time=slice(-reach, None)) for name, run in named.items()}
+            input_map = spec.input_map(named, states, inputs, spec.window)
+            before = spec.centre + input_map.history(spec.input_delays)
+            first = -spec.window - max(spec.state_reach, before)
+            read = {name: run.isel(time=slice(first, None)) for name, run in named.items()}
         start = replace(spec, window=None, ridge=RIDGES[-1], ridge_scale="per_snapshot")
         chosen = select(
             start,
@@ -369,7 +370,7 @@ class Subspace(Plain):
             coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
         )
         errors = lead_errors(
-            lambda windows, _: model._free_run(windows),
+            lambda windows, _: model._runs([windows])[0][0],
             (signature.state_delays, signature.input_delays),
             order + space.D.shape[1],
             stretches_of(data, signature, named),
@@ -414,24 +415,19 @@ class SubspaceModel(Model):
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        return weighed_runs(self, lambda own: [self._free_run(each)[None] for each in own], groups)
+        return weighed_runs(self, self._runs, groups)
 
-    def _free_run(self, windows: Windows) -> FloatArray:
-        signature, histories = self.signature, windows.histories
-        reach, direct = signature.input_delays + windows.steps, windows.direct
-        driving = windows.delayed[:, -reach:]
-        if not signature.inputs:
-            driving, direct = (np.zeros((len(histories), n, 0)) for n in (reach, windows.steps))
-        values = self.space.free_runs(
-            signature.state_scale.deviations(histories[:, -1 - signature.state_delays :]),
-            signature.input_scale.deviations(driving),
-            windows.steps,
-            signature.direct_scale.deviations(direct),
+    def _runs(self, groups: Sequence[Windows]) -> list[FloatArray]:
+        """The same, where no wave is predicted."""
+        runs = open_runs(
+            self.signature,
+            groups,
+            lambda batches: [self.space.free_runs(*each) for each in batches],
         )
-        with np.errstate(over="ignore"):  # a run that is lost is cut just below
-            values = signature.state_scale.physical(values, out=values)
-        values = cut_lost(values, signature, windows)
-        return values if windows.zero is None else values + windows.zero[:, None]
+        return [
+            (values if windows.zero is None else values + windows.zero[:, None])[None]
+            for values, windows in zip(runs, groups, strict=True)
+        ]
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """A."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Progress, check_choice, fraction, whole_number
+from seakeep.arrays import FloatArray, Progress, check_choice, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
     band_scale,
@@ -24,11 +24,9 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
-from seakeep.models.engine import Runs as FreeRuns
-from seakeep.models.engine import Windows, member_series, read_groups
+from seakeep.models.engine import Windows, member_series
 from seakeep.models.forecasts import reduce_members
 from seakeep.models.inputs import Signature
-from seakeep.models.training import TrainingArrays
 
 Band = Literal["members", "calibrated"]
 BandScale = Literal["spread", "constant", "learnt"]
@@ -58,22 +56,8 @@ class Judged(NamedTuple):
     starts: tuple[float, ...] = ()
 
 
-class Ensemble(FreeRuns, Protocol):
-    """Members of an ensemble that a calibration uses."""
-
-    @property
-    def arrays(self) -> TrainingArrays:
-        """What the members were trained on."""
-
-    @property
-    def read_spans(self) -> dict[str, tuple[float, float]]:
-        """First and last instant that members have read, of each run, s."""
-
-    def without(self, run: str) -> Ensemble:
-        """Members as they learn from the other runs."""
-
-    def without_part(self, begin: int, end: int) -> Ensemble:
-        """Members as they learn from the rest of the one run that trains."""
+Case = tuple[Any, xr.Dataset]
+"""An ensemble, whose room imports this one, and a run that it forecasts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +117,7 @@ class Calibration:
 
 
 def calibrate(
-    ensemble: Ensemble,
+    ensemble: Any,
     runs: labelled.Runs,
     steps: int,
     level: float,
@@ -148,27 +132,26 @@ def calibrate(
     check_choice("scale", scale, get_args(BandScale))
     if not (folds is None or (isinstance(folds, str) and folds == "run")):
         raise RequestError(f"folds must be 'run', or None for unread windows; received {folds!r}.")
-    sources = dict.fromkeys(named, ensemble)
-    for name, run in list(named.items()) if folds else ():
-        if (known := _read_run(ensemble, name, run)) is None:
-            continue
-        if len(ensemble.arrays.names) > 1:
-            sources[name] = ensemble.without(known)
-            continue
-        del named[name], sources[name]
-        for part, piece, source in _parts(ensemble, name, run):
-            named[part], sources[part] = piece, source
-    judged = held_out(sources, named, steps, level, executor, progress)
+    cases: dict[str, Case] = {}
+    for name, run in named.items():
+        known = _read_run(ensemble, name, run) if folds else None
+        if known is None:
+            cases[name] = ensemble, run
+        elif len(ensemble.arrays.names) > 1:
+            cases[name] = ensemble.without(known), run
+        else:
+            cases |= _parts(ensemble, name, run)
+    judged = held_out(cases, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
         ahead = ensemble.signature.input_after
-        longest = max(run.sizes["time"] for run in named.values()) - history - ahead
+        longest = max(run.sizes["time"] for _, run in cases.values()) - history - ahead
         reason = "members have read what is left of them"
         if longest < steps:
             reason = f"at most {max(longest, 0)} steps fit into the longest of them"
         raise RequestError(
             f"no window of {steps} steps with {history} samples of history is "
-            f"free in {', '.join(named)}, as given here: {reason}. Give fewer steps, longer parts, "
+            f"free in {', '.join(cases)}, as given here: {reason}. Give fewer steps, longer parts, "
             "or runs that do not train; or let each run that trains be forecast by what the "
             "others teach (folds = 'run')."
         )
@@ -217,8 +200,7 @@ def learn_margin(
 
 
 def held_out(
-    ensembles: Mapping[str, Ensemble],
-    runs: Datasets,
+    cases: Mapping[str, Case],
     steps: int,
     level: float,
     executor: Executor | None = None,
@@ -228,10 +210,8 @@ def held_out(
 
     Parameters
     ----------
-    ensembles : mapping of str to Ensemble
-        What forecasts each run.
-    runs : mapping of str to Dataset
-        Runs, or parts of runs, under the names by which they trained.
+    cases : mapping of str to (HankelEnsemble, Dataset)
+        What forecasts each run, or part of one, under the names by which they trained.
     steps : int
         Instants of a window.
     level : float
@@ -244,20 +224,18 @@ def held_out(
     dict of str to Judged
         Runs in which there is such a window.
     """
-    level = fraction(level, "level")
-    free = {name: _free_samples(ensembles[name], name, run, steps) for name, run in runs.items()}
+    free = {name: _free_samples(*case, name, steps) for name, case in cases.items()}
     free = {name: places for name, places in free.items() if places}
     judged: dict[str, Judged] = {}
-    done, total = 0, sum(ensembles[name].n_members for name in free)
+    done, total = 0, sum(cases[name][0].n_members for name in free)
     for name, places in free.items():
-        ensemble, run = ensembles[name], runs[name]
+        ensemble, run = cases[name]
         signature = ensemble.signature
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
         time = np.asarray(run["time"].values, dtype=float)
         starts = tuple(float(time[at]) for at in places)
-        places_of = [(name, start) for start in starts]
-        (windows,) = read_groups(signature, {name: run}, [(places_of, steps)])
+        windows = ensemble.read_windows(run, starts, steps, name=name)
         ((series, lost),) = member_series(ensemble, [windows], executor, tell)
         values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)
@@ -266,9 +244,7 @@ def held_out(
     return judged
 
 
-def _parts(
-    ensemble: Ensemble, name: str, run: xr.Dataset
-) -> Iterator[tuple[str, xr.Dataset, Ensemble]]:
+def _parts(ensemble: Any, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:
     """Thirds of the run that trains alone, and the ensemble as it learns from the rest of it."""
     begin, half = ensemble.arrays.begins[0], 0.5 * ensemble.signature.dt
     edges = np.linspace(0, len(ensemble.arrays.states[0]), PARTS + 1).round().astype(int)
@@ -277,7 +253,7 @@ def _parts(
     for number in range(PARTS):
         part = run.sel(time=slice(times[number], times[number + 1]))
         source = ensemble.without_part(int(edges[number]), int(edges[number + 1]))
-        yield f"{name}, part {number + 1}", part, source
+        yield f"{name}, part {number + 1}", (source, part)
 
 
 def envelope_of(signature: Signature, windows: Windows) -> FloatArray:
@@ -299,7 +275,7 @@ def _counted(progress: Progress, before: int, total: int, name: str) -> Progress
     return lambda done, _, what: progress(before + done, total, f"{name}, {what}")
 
 
-def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[int]:
+def _free_samples(ensemble: Any, run: xr.Dataset, name: str, steps: int) -> list[int]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
     whole_number(steps, "steps")
     time, signature = np.asarray(run["time"].values, dtype=float), ensemble.signature
@@ -318,7 +294,7 @@ def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) ->
     return places
 
 
-def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
+def _read_run(ensemble: Any, name: str, run: xr.Dataset) -> str | None:
     """Which run of the training this is: the one that holds its samples, else that of its name.
 
     A name that was made up for a run without one says nothing.
@@ -330,21 +306,16 @@ def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
     return name if name in spans and not labelled.is_made_up(name, run) else None
 
 
-def _holds(
-    run: xr.Dataset, ensemble: Ensemble, name: str, begin: float, states: FloatArray
-) -> bool:
+def _holds(run: xr.Dataset, ensemble: Any, name: str, begin: float, states: FloatArray) -> bool:
     """Whether a run has the same states at the same instants, as far as both reach."""
     time = np.asarray(run["time"].values, dtype=float)
     if not time.size:
         return False
     ahead = round((begin - time[0]) / ensemble.signature.dt)  # samples before the states
-    first, skipped = max(ahead, 0), max(-ahead, 0)
-    count = min(time.size - first, len(states) - skipped)
-    if count < 1:
-        return False
-    here = slice(first, first + count)
-    values = labelled.channel_matrix(run, ensemble.signature.states, name, here)
-    return bool(np.array_equal(values, states[skipped : skipped + count]))
+    values = labelled.channel_matrix(run, ensemble.signature.states, name)
+    here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
+    count = min(len(here), len(there))
+    return count > 0 and np.array_equal(here[:count], there[:count])
 
 
 def calibrated_for(calibration: Calibration | None, level: float) -> Calibration:

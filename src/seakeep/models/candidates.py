@@ -167,16 +167,15 @@ class Candidates:
         return every[self.cut :]
 
     def _is_without(self, candidate: Any) -> bool:
-        """Whether a candidate lacks the look-ahead that is left open and stated."""
+        """Whether a candidate lacks the look-ahead that is left open, and stated there alone."""
         is_open = "lead" in self.opened and not candidate.follows_surge
-        return is_open and candidate.lead == 0 < self.base.lead
+        squares = any(getattr(each, "lead", 0.0) for each in self.base.observables)
+        return is_open and candidate.lead == 0 < self.base.lead and not squares
 
     def columns(self, candidate: Any) -> Columns:
         """What makes columns of their own."""
-        if candidate.follows_surge:
-            return candidate.alignment, candidate.lead, True
-        squares = any(getattr(each, "lead", 0.0) for each in self.offered(candidate))
-        return candidate.alignment, None, squares or not self._is_without(candidate)
+        ahead = candidate.lead if candidate.follows_surge else None
+        return candidate.alignment, ahead, not self._is_without(candidate)
 
     def widest(self) -> dict[Columns, HankelSettings]:
         """Settings that hold the columns of all that is tried; those of the base are the first."""

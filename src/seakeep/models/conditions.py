@@ -67,7 +67,7 @@ class Disagreement:
     run: str
     pooled: float
     own: float
-    reason: Reason
+    reason: Reason = "dynamics"
     channel: str = ""
     value: float = np.nan
     spread: float = np.nan
@@ -152,17 +152,17 @@ def disagreements(
                 break
             judged.remove(odd)
             del left[odd]
-            reason: tuple[Any, ...] | None
             reason = _reason(fitted(left), runs[odd], steps, scales[odd], own[odd])
             placed = False
-            if reason is None or reason[0] != "offset":
+            if reason.get("reason") != "offset":
                 with contextlib.suppress(DataError, RequestError):  # no depth, or no positions
                     reason = _place(fitted(left, at_rest), runs[odd]) or reason
                     placed = True
-            pair = [float(_scores(each[odd]).mean()) for each in (errors, own)]
-            said = Disagreement(odd, pair[0], pair[1], *(reason or ("dynamics",)))
+            whole, alike = (float(_scores(each[odd]).mean()) for each in (errors, own))
             rival = next(iter(left)) if len(left) == 1 else ""
-            disagreeing.append(replace(said, rival=rival, placed=placed))
+            disagreeing.append(
+                Disagreement(odd, whole, alike, rival=rival, placed=placed, **reason)
+            )
     return disagreeing
 
 
@@ -201,7 +201,7 @@ def _errors(model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale) -
 
 def _reason(
     model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale, own: FloatArray
-) -> tuple[Reason, str, float] | None:
+) -> dict[str, Any]:
     """The offset or the scale of a state that explains what a model of other runs errs more."""
     # What a run starts with has an offset and a scale of its own; later the waves decide.
     predicted, measured, own = (
@@ -212,24 +212,26 @@ def _reason(
     offsets = errors.mean(axis=0)
     at = int(np.argmax(np.abs(offsets)))
     if np.sum(offsets**2) >= least:
-        return "offset", model.states[at], float(offsets[at] * scale.spread[at])
+        value = float(offsets[at] * scale.spread[at])
+        return {"reason": "offset", "channel": model.states[at], "value": value}
     p, m = ((each - each.mean(axis=(0, 1))).reshape(errors.shape) for each in (predicted, measured))
     factors = np.sum(p * m, axis=0) / np.sum(p * p, axis=0)
     gains = np.mean((m - p) ** 2, axis=0) - np.mean((m - factors * p) ** 2, axis=0)
     at = int(np.argmax(gains))
     mean = float(offsets[at] ** 2)  # another unit moves the mean of a load too
     is_scale = gains.sum() + mean >= least and gains[at] >= (1 - EXPLAINS) * (gains[at] + mean)
-    return ("scale", model.states[at], float(factors[at])) if is_scale else None
+    scaled = {"reason": "scale", "channel": model.states[at], "value": float(factors[at])}
+    return scaled if is_scale else {}
 
 
-def _place(model: HankelDMDcModel, run: xr.Dataset) -> tuple[Reason, str, float, float] | None:
+def _place(model: HankelDMDcModel, run: xr.Dataset) -> dict[str, Any]:
     """A distance of the probe that explains the error of a model of other runs."""
     time = run["time"].values
     best = estimate_probe_offset(model, run, (float(time[len(time) // 2]), float(time[-1])))
     is_certain = best.interval[0] * best.interval[1] > 0
     if not is_certain or best.nrmse**2 > (1.0 - EXPLAINS) * best.nrmse_uncorrected**2:
-        return None
-    return "probe position", "", best.offset, best.spread
+        return {}
+    return {"reason": "probe position", "value": best.offset, "spread": best.spread}
 
 
 COARSE = 20  # distances on either side of zero

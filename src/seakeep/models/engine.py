@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -27,6 +27,7 @@ from seakeep.arrays import (
     IntArray,
     Progress,
     check_choice,
+    undefined,
     whole_number,
 )
 from seakeep.core.recursion import Recursion, read_table, recursion
@@ -63,12 +64,8 @@ class Windows:
 
     Parameters
     ----------
-    places : tuple of (str, float)
-        Run and start of each window, s.
     steps : int
         Instants forecast from each start.
-    time : tuple of Variable, each of shape (steps,)
-        These instants.
     histories : ndarray, shape (window, at least s + 1, N)
         Measured states up to each start, physical units.
     delayed : ndarray, shape (window, z + steps, n)
@@ -76,6 +73,10 @@ class Windows:
         start on those at the place of the start.
     direct : ndarray, shape (window, steps, m)
         Direct regressors from the start on; then without the slow surge squared.
+    places : tuple of (str, float)
+        Run and start of each window, s.
+    time : tuple of Variable, each of shape (steps,)
+        Instants that are forecast, where they are of a run.
     notes : dict
         What a forecast's attributes report of the first run, of the input map there, and of how
         far ahead it reads.
@@ -96,12 +97,12 @@ class Windows:
         opposites.
     """
 
-    places: tuple[tuple[str, float], ...]
     steps: int
-    time: tuple[xr.Variable, ...]
     histories: FloatArray
     delayed: FloatArray
     direct: FloatArray
+    places: tuple[tuple[str, float], ...] = ()
+    time: tuple[xr.Variable, ...] = ()
     notes: Mapping[str, str | float] = field(default_factory=dict)
     table: FloatArray | None = None
     starts: IntArray | None = None
@@ -224,11 +225,8 @@ def _windows(signature: Signature, runs: Sequence[_Opened], spans: Sequence[Span
         attrs = dict(run.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
         instants = run.instants(span.known + 1, span.stop + 1, dt)
         time.append(xr.Variable(("time",), instants, attrs))
-        first = span.known + 1 - signature.state_samples
-        rows = slice(first, span.known + 1)
-        states = labelled.channel_matrix(run.run, signature.states, run.name, rows)
-        labelled.check_finite(states, signature.states, run.run, run.name, first)
-        histories.append(states)
+        rows = slice(span.known + 1 - signature.state_samples, span.known + 1)
+        histories.append(labelled.sound_matrix(run.run, signature.states, run.name, rows))
         look_ahead.append(maps.look_ahead(run.run, dt))
         step = steps
         if run.known is not None:
@@ -279,10 +277,7 @@ def _series(
             for group in zip(*before, strict=True)
         ]
     if follows is None:
-        read = [
-            drive.rows(span.first, span.stop if signature.inputs else span.known + 1)
-            for drive, span in pairs
-        ]
+        read = [drive.rows(span.first, span.stop) for drive, span in pairs]
         delayed = np.stack([each.delayed for each in read])
         direct = np.stack([each.direct[z:] for each in read])
         if reference:
@@ -301,7 +296,7 @@ def _series(
             offsets[drive] = length - first
             length += len(table)
         starts.append(offsets[drive] + span.known)
-    table = tables[0] if len(tables) == 1 else np.concatenate(tables)
+    table = np.concatenate(tables)
     steps, at = spans[0].stop - spans[0].known, np.array(starts)
     here = np.stack([drive.places(span.first, span.known + 1) for drive, span in pairs])
     here = np.concatenate([here, here[:, -1:].repeat(steps - 1, axis=1)], axis=1)
@@ -416,14 +411,16 @@ class _Opened:
         maps, names = signature.input_map, signature.inputs
         read = [maps.reads(span) for span in self.spans]
         first = min(each.first for each in read)
-        stop = max(each.stop for each in read) if names else first
+        stop = max(each.stop for each in read)
         surge = None
         if (follows := maps.follows) is not None:
             last = max(span.known for span in self.spans) + 1  # no later state is read
             channel, rows = [signature.states[follows.column]], slice(first, last)
             surge = labelled.channel_matrix(self.run, channel, self.name, rows)[:, 0]
         for run in self._continued(signature, first, stop) if predicts else [self.run]:
-            values = labelled.channel_matrix(run, names, self.name, slice(first, stop))
+            values = np.empty((stop - first, 0))  # without inputs it may end after the run
+            if names:
+                values = labelled.channel_matrix(run, names, self.name, slice(first, stop))
             for each in read:
                 wanted = values[each.first - first : each.stop - first]
                 labelled.check_finite(wanted, names, run, self.name, each.first)
@@ -519,9 +516,8 @@ def array_windows(
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
         drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
     return Windows(
-        places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
-        time=(),
+        places=(("these arrays", 0.0),) * len(histories),
         **_series(signature, histories, drives, [span] * len(drives)),
     )
 
@@ -538,9 +534,10 @@ def linear_runs(
     if any(windows.table is not None for windows in groups):
         runs = [_followed_runs(members, windows) for windows in groups]
     else:
-        every = zip(*(_open_runs(each, groups) for each in members), strict=True)
-        # One member needs no copy.
-        runs = [np.stack(each) if len(each) > 1 else each[0][None] for each in every]
+        every = (
+            open_runs(each.signature, groups, partial(rollouts, *each.matrices)) for each in members
+        )
+        runs = [np.stack(each) for each in zip(*every, strict=True)]
     for values, windows in zip(runs, groups, strict=True):
         if readouts:
             read_out(readouts, values, windows.waves)
@@ -583,7 +580,7 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     computed, used = recursion(
         models, follows.place, histories, delayed, windows.table, windows.starts, forcing
     )
-    with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
+    with undefined():  # a run that is lost is cut just below
         for values, drove, of in zip(computed, used, own, strict=True):
             driving = np.concatenate([delayed, drove], axis=1)
             of.state_scale.physical(values, out=values)
@@ -591,21 +588,37 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     return computed
 
 
-def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
-    """Free runs over all windows as products of matrices."""
-    own, batches = member.signature, []
+def open_runs(
+    signature: Signature,
+    groups: Sequence[Windows],
+    run: Callable[[list[tuple[FloatArray, FloatArray, FloatArray]]], list[FloatArray]],
+) -> list[FloatArray]:
+    """Free runs over all windows as products of matrices, each (window, steps, N).
+
+    Parameters
+    ----------
+    signature : Signature
+        Delays and scales.
+    groups : sequence of Windows
+        What is read.
+    run : callable
+        Runs of batches of standardised states, delayed and direct regressors.
+    """
+    batches = []
     for windows in groups:
         steps = windows.steps
-        driving = windows.delayed[:, windows.delayed.shape[1] - own.input_delays - steps :]
+        driving = windows.delayed[:, windows.delayed.shape[1] - signature.input_delays - steps :]
         if not driving.shape[2]:
-            driving = np.zeros((len(driving), steps, 0))
-        history = own.state_scale.deviations(windows.histories[:, -1 - own.state_delays :])
-        direct = own.direct_scale.deviations(windows.direct)
-        batches.append((history, own.input_scale.deviations(driving), direct))
-    computed = rollouts(*member.matrices, batches, n_states=len(own.state_labels))
-    with np.errstate(over="ignore"):  # a run that is lost is cut just below
+            driving = driving[:, :steps]
+        history = signature.state_scale.deviations(
+            windows.histories[:, -1 - signature.state_delays :]
+        )
+        direct = signature.direct_scale.deviations(windows.direct)
+        batches.append((history, signature.input_scale.deviations(driving), direct))
+    computed = run(batches)
+    with undefined():  # a run that is lost is cut just below
         for windows, values in zip(groups, computed, strict=True):
-            cut_lost(own.state_scale.physical(values, out=values), own, windows)
+            cut_lost(signature.state_scale.physical(values, out=values), signature, windows)
     return computed
 
 
@@ -616,8 +629,6 @@ def _excess(signature: Signature, windows: Windows) -> FloatArray:
     """
     z = signature.input_delays
     first = windows.delayed.shape[1] - z - windows.steps
-    if first < 0:  # without inputs
-        return np.ones((len(windows), windows.steps))
     delayed, direct = (
         # The slow surge squared is no input.
         (np.abs(x - scale.centre[: x.shape[2]]) / scale.bound[: x.shape[2]]).max(axis=2, initial=1)
@@ -644,7 +655,7 @@ def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> Floa
     scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
     reach = GROWTH * np.maximum(scale.bound, start)
-    with np.errstate(invalid="ignore", over="ignore"):
+    with undefined():
         farthest = np.zeros(values.shape[:2])
         for column, centre in enumerate(scale.centre):  # one after the other takes little room
             away = np.abs(values[..., column] - centre)

@@ -18,7 +18,6 @@ from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.executor import in_order
 from seakeep.models import store
-from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import (
     Band,
     BandScale,
@@ -190,11 +189,6 @@ class HankelEnsemble(Model):
             for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
             if len(x)
         }
-
-    @property
-    def alignment(self) -> FittedAlignment | None:
-        """How the wave input is aligned to the vessel; the training arrays are aligned."""
-        return self.signature.input_map.alignment
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)

@@ -26,7 +26,7 @@ from seakeep.arrays import (
 from seakeep.errors import RequestError, warn
 from seakeep.files import write_sealed
 from seakeep.models import engine, store
-from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Series, Windows, first_lost
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix
@@ -115,6 +115,11 @@ class Model:
     def lead_samples(self) -> int:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
+
+    @property
+    def alignment(self) -> FittedAlignment | None:
+        """How the wave input is aligned to the vessel, as completed from the training runs."""
+        return self.signature.input_map.alignment
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)

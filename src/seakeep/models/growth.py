@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray
+from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, undefined
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.readouts import FittedReadOut
@@ -112,9 +112,7 @@ class Stretch:
             places = [(name, begin + at * signature.dt) for at in starts]
             return read_groups(signature, {name: run}, [(places, steps)])[0]
         return Windows(
-            places=(("training", 0.0),) * len(starts),
             steps=steps,
-            time=(),
             histories=np.stack([self.states[at - s : at + 1] for at in starts]),
             delayed=np.stack([self.delayed[at - z : at + steps] for at in starts]),
             direct=np.stack([self.direct[at : at + steps] for at in starts]),
@@ -175,7 +173,7 @@ def lead_errors(
     longest_first = sorted(stretches, key=lambda each: each.first - each.last)
     errors = _errors(forecast, delays, longest_first, steps, WINDOWS, readouts)
     known = np.isfinite(errors)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where all have diverged
+    with undefined():  # where all have diverged
         square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
     square = square[np.isfinite(square).all(axis=1)]
     # One step is what the residuals are, of which there are more.

@@ -70,10 +70,6 @@ class InputMap:
         """The observables, which may be none."""
         return self.observed or NOTHING
 
-    def with_delayed(self, values: FloatArray) -> FloatArray:
-        """Inputs, shape (time, Q), beside the columns of observables that take the delays."""
-        return values if self.observed is None else self.observed.with_delayed(values)
-
     @cached_property
     def _around(self) -> tuple[int, int, int]:
         """Samples that rows read: before those with delays, before those without, after both."""
@@ -202,7 +198,7 @@ class Drive:
 
     Parameters
     ----------
-    made : InputMap
+    input_map : InputMap
         The map.
     values : ndarray, shape (time, Q)
         Inputs, carried to a measured surge, from the sample `first` of the run on.
@@ -239,7 +235,7 @@ class Drive:
             begin, end = (each + input_map.lead - self.first for each in (first, stop))
             back, _, ahead = input_map._around
             low = max(begin - back, 0)
-            values = input_map.with_delayed(self.values[low : end + ahead - input_map.lead])
+            values = input_map.columns.with_delayed(self.values[low : end + ahead - input_map.lead])
             return Regressors(values[begin - low : end - low], direct)
         place, here = input_map.follows.place, self.places(first, stop)
         if table is None:
@@ -273,7 +269,7 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        flat = input_map.with_delayed(out.reshape(-1, out.shape[2]))
+        flat = input_map.columns.with_delayed(out.reshape(-1, out.shape[2]))
         return flat.reshape(stop - first, count, flat.shape[1])
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:

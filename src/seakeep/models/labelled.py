@@ -221,10 +221,12 @@ def check_channels(run: xr.Dataset, names: Sequence[str], name: str) -> list[xr.
     return out
 
 
-def sound_matrix(run: xr.Dataset, names: Sequence[str], name: str) -> FloatArray:
+def sound_matrix(
+    run: xr.Dataset, names: Sequence[str], name: str, samples: slice = slice(None)
+) -> FloatArray:
     """Channels of a run side by side; gaps raise a DataError."""
-    values = channel_matrix(run, names, name)
-    check_finite(values, names, run, name)
+    values = channel_matrix(run, names, name, samples)
+    check_finite(values, names, run, name, samples.start or 0)
     return values
 
 

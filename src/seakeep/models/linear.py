@@ -16,7 +16,6 @@ from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefine
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
-from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name
 from seakeep.models.growth import LeadErrors, linear_errors, stretches_of, weighed_runs
@@ -123,11 +122,6 @@ class HankelDMDcModel(Model):
         return linear_errors([self.dynamics], stretches, self.signature.readouts)
 
     @property
-    def alignment(self) -> FittedAlignment | None:
-        """How the wave input is aligned to the vessel, as completed from the training runs."""
-        return self.signature.input_map.alignment
-
-    @property
     def state_scale(self) -> Scale:
         """Moments of the states over the training windows."""
         return self.signature.state_scale
@@ -160,12 +154,12 @@ class HankelDMDcModel(Model):
     @cached_property
     def A(self) -> FloatArray:
         """Â, shape (N(s+1), N(s+1)), on standardised deviations, newest block first."""
-        return _read_only(self.dynamics.system.astype(float, copy=False))
+        return _read_only(self.dynamics.system)
 
     @cached_property
     def B(self) -> FloatArray:
         """B̂, shape (N(s+1), Q(z+1)), on standardised deviations, newest block first."""
-        b = self.dynamics.matrices[1].astype(float, copy=False)
+        b = self.dynamics.matrices[1]
         missing = self.A.shape[0] - b.shape[0]
         return _read_only(np.concatenate([b, np.zeros((missing, b.shape[1]))]))
 

@@ -33,6 +33,7 @@ from seakeep.arrays import (
     fraction,
     plain,
     positive,
+    undefined,
     whole_number,
 )
 from seakeep.core.kalman import DelayFilter, process_noise
@@ -328,7 +329,7 @@ class Live:
         before the first. NaN where there is none yet.
         """
         self._finish()
-        with np.errstate(invalid="ignore"):  # 0/0 before the first
+        with undefined():  # 0/0 before the first
             means: FloatArray = self._squares[0] / self._squares[1]
         return means
 
@@ -668,7 +669,7 @@ class Live:
         self._innovation, lead = innovation, self._count.lead * is_driven
         measured = self._row("y", at)
         squares = np.full((2, measured.size), np.nan)
-        with np.errstate(over="ignore"):
+        with undefined():
             squares[0] = (innovation / (update.deviations if update else self._deviations)) ** 2
             if lead:
                 predicted = self._predicted(self._free, at - 1)

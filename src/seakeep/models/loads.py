@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +54,7 @@ def fit_readouts(
     readouts: Mapping[str, Asked],
     data: TrainingData,
     runs: Datasets,
-    judged: Sequence[Held],
+    held: Iterable[Held],
 ) -> tuple[FittedReadOut, ...]:
     """Fit read-outs.
 
@@ -66,7 +66,7 @@ def fit_readouts(
         Of the training windows.
     runs : mapping of str to Dataset
         The runs that these are cut from.
-    judged : sequence of Held
+    held : iterable of Held
         Cross-fitted forecasts, for those whose kind is to be chosen; may be empty.
 
     Returns
@@ -83,6 +83,7 @@ def fit_readouts(
     windows = zip(states, data.windows, strict=True)
     seen = np.concatenate([values[window.samples] for values, window in windows])
     follows, out = signature.input_map.follows, []
+    judged = [] if follows is None else [*held]
     spacing = 0.0 if follows is None else follows.place.spacing
     places: FloatArray = STEP * spacing * np.arange(-REACH, REACH + 1.0)
     waves = [_waves(data, runs, number, places) for number in range(len(states) * bool(follows))]
@@ -169,7 +170,7 @@ class _Line:
         for window, x, wave in zip(data.windows, states, waves, strict=True):
             inside = slice(window.first_column + 1, window.last + 1)
             known, seen = x[inside, [*columns, column]], wave[inside]
-            sound = np.isfinite(known).all(axis=1) & np.isfinite(seen).all(axis=(1, 2))
+            sound = np.isfinite(seen).all(axis=(1, 2))
             self.pieces.append((known[sound], seen[sound].swapaxes(0, 1)))
         moments, products = [], []
         for at in range(len(places)):
@@ -223,16 +224,16 @@ def _chosen(
         both = np.stack([each.predicted[..., line.column], load(each.predicted, wave)])
         error = metrics.nrmse(
             predicted=np.maximum(both, floor)[..., None],
-            measured=np.broadcast_to(each.measured[..., line.column], both.shape)[..., None],
+            measured=each.measured[..., [line.column]],
             training_std=line.spread,
         )
         errors.append(np.minimum(error[..., 0], WORST))
-    none, wave = np.concatenate([np.empty((2, 0)), *errors], axis=1)
-    sound = np.isfinite(none) & np.isfinite(wave)
-    if not sound.any():
+    every = np.concatenate([np.empty((2, 0)), *errors], axis=1)
+    none, wave = every[:, np.isfinite(every).all(axis=0)]
+    if not none.size:
         return "none", {}
-    scores = {"none": float(none[sound].mean()), "wave": float(wave[sound].mean())}
-    gain = (none - wave)[sound]
+    scores = {"none": float(none.mean()), "wave": float(wave.mean())}
+    gain = none - wave
     doubt = float(gain.std(ddof=1)) / len(gain) ** 0.5 if len(gain) > 1 else np.inf
     least = max(STANDARD_ERRORS * doubt, LEAST * scores["none"])
     return ("wave" if gain.mean() > least else "none"), scores

@@ -9,7 +9,7 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from seakeep.core.solve import Solution
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
 from seakeep.models.inputs import Signature
-from seakeep.models.settings import HankelSettings
 from seakeep.models.training import TrainingData, system_of
 
 
@@ -42,7 +41,7 @@ class Variation:
     """
 
     slopes: FloatArray
-    shifts: tuple[FloatArray, FloatArray, FloatArray]
+    shifts: tuple[FloatArray, ...]
     centre: float
     spread: float
     low: float
@@ -66,7 +65,7 @@ class Variation:
 
 
 def regress_varying(
-    data: TrainingData, settings: HankelSettings, parameter: str, values: Sequence[float]
+    data: TrainingData, settings: Any, values: Sequence[float]
 ) -> tuple[Solution, TrainingData, Variation]:
     """Regress on the regressors and on q times them.
 
@@ -74,10 +73,8 @@ def regress_varying(
     ----------
     data : TrainingData
         Gathered runs.
-    settings : HankelSettings
-        Exact delay rows.
-    parameter : str
-        Name of the parameter.
+    settings : HankelDMDc
+        With a parameter, and exact delay rows.
     values : sequence of float
         Parameter of each run.
 
@@ -98,7 +95,7 @@ def regress_varying(
     known, counts = np.array(values), np.array([each.columns for each in data.windows])
     if np.ptp(known) == 0:
         raise DataError(
-            f"all runs have {parameter} = {known[0]:g}, so that nothing can be "
+            f"all runs have {settings.parameter} = {known[0]:g}, so that nothing can be "
             "learnt of it. Train on runs at two values or more, or leave parameter out."
         )
     centre = float(np.average(known, weights=counts))
@@ -122,26 +119,20 @@ def regress_varying(
     gram: Any = 0.0
     right: Any = 0.0
     for run, (window, part) in enumerate(zip(data.windows, q, strict=True)):
-        system = system_of([[x[run]] for x in series], [window], settings)
+        system, both = system_of([[x[run]] for x in series], [window], settings), [1.0, part]
         own = np.triu(system.gram) + np.triu(system.gram, 1).T
-        gram = gram + np.kron(np.array([[1.0, part], [part, part**2]]), own)
-        right = right + np.concatenate([system.right, part * system.right], axis=1)
+        gram = gram + np.kron(np.outer(both, both), own)
+        right = right + np.kron(both, system.right)
     factor = counts.sum() if settings.ridge_scale == "per_snapshot" else 1.0
     ridge = factor * float(settings.ridge)
-    both = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
+    parts = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
     size = len(data.signature.states)
     fixed, slopes = (
-        spread_means(each, size, settings.state_delays, settings.blocks) for each in both
+        spread_means(each, size, settings.state_delays, settings.blocks) for each in parts
     )
-    variation = Variation(
-        slopes,
-        (shifts[0], shifts[1], shifts[2]),
-        centre,
-        spread,
-        float(known.min()),
-        float(known.max()),
-    )
-    signature = replace(data.signature.scaled(*scales), parameter=parameter)
+    low, high = float(known.min()), float(known.max())
+    variation = Variation(slopes, tuple(shifts), centre, spread, low, high)
+    signature = replace(data.signature.scaled(*scales), parameter=settings.parameter)
     data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
 
@@ -149,14 +140,10 @@ def regress_varying(
 def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
     """Training data of the runs at each value of a parameter."""
     values = [parameter_of(runs[name], parameter, name) for name in data.names]
-    per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs", "zeros")
+    signature, *parts = (getattr(data, each.name) for each in fields(data))
     out = {}
     for value in sorted(set(values)):
         there = [number for number, each in enumerate(values) if each == value]
-        cut: dict[str, Any] = {
-            key: tuple(getattr(data, key)[n] for n in there)
-            for key in per_run
-            if getattr(data, key)
-        }
-        out[value] = replace(data, **cut)
+        own = (tuple(part[number] for number in there if part) for part in parts)
+        out[value] = TrainingData(signature, *own)
     return out

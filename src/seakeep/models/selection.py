@@ -24,6 +24,7 @@ from collections.abc import (
 )
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -38,12 +39,12 @@ from seakeep.models import labelled
 from seakeep.models.candidates import Candidates, Columns, Given, Step, alignments_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.inputs import Scale, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
-from seakeep.models.training import TrainingData, gather, scales_of, system_of
+from seakeep.models.training import TrainingData, gather, system_of
 from seakeep.signals import encounter_period, repeated_waves
 from seakeep.signals.waves import is_regular
 
@@ -70,8 +71,8 @@ NEAR = 1.2
 """Error, in parts of the best, above which the other λ of a candidate are left.
 
 On the virtual tank they lower that of a candidate by 7 % at most."""
-LAST = 3
-"""Runs whose windows each problem keeps in memory: the next round begins with them."""
+FEW = 3
+"""Runs up to which a problem keeps their windows in memory."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -135,12 +136,11 @@ class Trial:
 
     def between(self) -> list[float]:
         """λ that were not tried, up to the next that is worse on either side of the best."""
-        tried = np.isfinite(self.means)
+        tried = np.flatnonzero(np.isfinite(self.means))
         near = np.flatnonzero(self.means <= (1.0 + ALIKE) * self.best)
-        places = np.flatnonzero(tried)
-        low = places[places < near[0]].max(initial=-1)
-        high = places[places > near[-1]].min(initial=len(tried))
-        return [self.levels[at] for at in range(low + 1, high) if not tried[at]]
+        low = tried[tried < near[0]].max(initial=-1)
+        high = tried[tried > near[-1]].min(initial=len(self.levels))
+        return [self.levels[at] for at in range(low + 1, high) if at not in tried]
 
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
@@ -184,7 +184,7 @@ def scores_of(runs: FreeRuns) -> FloatArray:
     with np.errstate(over="ignore", invalid="ignore"):
         errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
     judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
-    errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
+    errors = np.fmin(errors, WORST)
     moved = judged.any(axis=-1)
     return np.mean(errors[:, moved], axis=-1, where=judged[moved])
 
@@ -203,12 +203,10 @@ class Problem:
         Gathered with the longest delays, the longest lead and all observables.
     widest : HankelSettings
         What `data` was gathered with.
-    ridges : tuple of float
-        λ that are tried, in ascending order.
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        What :meth:`windows` gave last, by run and lengths, of ``LAST`` of them at most.
+        What :meth:`windows` gave, by run and horizons, where there are but a ``FEW`` runs.
     taught : dict
         By the runs that teach, the normal equations of all columns that were made last, which
         candidates share.
@@ -218,14 +216,9 @@ class Problem:
     groups: tuple[str, ...]
     data: TrainingData
     widest: HankelSettings
-    ridges: tuple[float, ...]
     horizons: tuple[int, ...]
-    read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(
-        default_factory=dict, init=False, repr=False
-    )
-    taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(default_factory=dict)
+    taught: dict[tuple[int, ...], tuple[Any, Signature, PrimalSystem]] = field(default_factory=dict)
 
     def ahead(self, candidate: HankelSettings) -> int:
         """Samples that delayed regressors look ahead too far."""
@@ -258,7 +251,7 @@ class Problem:
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
         wide = self._widened(candidate)
-        scales, system = self._system(candidate, wide, runs)
+        signature, system = self._system(candidate, wide, runs)
         own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
         lags = np.tile(delayed, z + 1)
         later = np.pad(lags, (0, delayed.size * (wide.input_delays - z)))
@@ -275,9 +268,7 @@ class Problem:
         there = np.concatenate([states, lags, direct])
         coefficients = np.zeros((*path.shape[:2], there.size))
         coefficients[..., there] = path
-        signature = replace(
-            data.signature.scaled(*scales), state_delays=candidate.state_reach, input_delays=z
-        )
+        signature = replace(signature, state_delays=candidate.state_reach, input_delays=z)
         return [Dynamics(each, signature) for each in coefficients]
 
     def _widened(self, candidate: HankelSettings) -> HankelSettings:
@@ -289,29 +280,18 @@ class Problem:
 
     def _system(
         self, candidate: HankelSettings, wide: HankelSettings, runs: Sequence[int]
-    ) -> tuple[list[Scale], PrimalSystem]:
-        """Moments of some runs, and normal equations of all columns with the longest delays."""
+    ) -> tuple[Signature, PrimalSystem]:
+        """Signature of some runs, and normal equations of all columns with the longest delays."""
         ahead, of = self.ahead(candidate), tuple(runs)
         key = ahead, wide.state_delays, wide.memory, wide.is_filter
         made = self.taught.get(of)
         if made is None or made[0] != key:
-            data, chain = self.data, self.data.signature.input_map
-            windows = [data.windows[run] for run in runs]
-            labels = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
-            series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
-            scales = list(scales_of(series, windows, labels, True, chain.stretch))
+            data = self.data.of(runs, self.widest)
             # Later by the samples that a row looks ahead too far.
-            series[1] = [np.roll(each, ahead, axis=0) for each in series[1]]
-            groups = [
-                [scale.deviations(each) for each in group]
-                for group, scale in zip(series, scales, strict=True)
-            ]
-            made = self.taught[of] = key, scales, system_of(groups, windows, wide)
+            delayed = [np.roll(each, ahead, axis=0) for each in data.delayed]
+            system = system_of((data.states, delayed, data.direct), data.windows, wide)
+            made = self.taught[of] = key, data.signature, system
         return made[1:]
-
-    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
-        """λ that are tried of a candidate."""
-        return self.ridges if candidate.has_path else (float(candidate.ridge),)
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
         """Whether the model of all runs grows; neither a filter nor a subspace model does."""
@@ -325,16 +305,16 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
-    def windows(self, run: int, horizons: Sequence[int]) -> list[Read]:
+    def windows(self, run: int) -> list[Read]:
         """Windows by which a run is forecast over all horizons, the longest first.
 
         A longer free run begins with the shorter one from the same sample.
         """
-        key = run, tuple(horizons)
+        key = run, self.horizons
         if (found := self.read.get(key)) is None:
             data, dt, name = self.data, self.data.signature.dt, self.data.names[run]
             new, known = dict[int, list[int]](), set[int]()
-            for steps in sorted(horizons, reverse=True):
+            for steps in sorted(self.horizons, reverse=True):
                 new[steps] = [at for at in self.starts(run, steps).tolist() if at not in known]
                 known.update(new[steps])
             places = [
@@ -348,9 +328,8 @@ class Problem:
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
                 # Read-outs are learnt from departures.
                 found.append((starts, *windows.departing(measured, data.zero(run))))
-            for old in list(self.read)[: len(self.read) - LAST + 1]:
-                self.read.pop(old, None)
-            self.read[key] = found
+            if len(self.groups) <= FEW:
+                self.read[key] = found
         return found
 
     def folds(self) -> list[int]:
@@ -358,7 +337,7 @@ class Problem:
         runs = range(len(self.groups))
         return [run for run in runs if any(self.starts(run, k).size for k in self.horizons)]
 
-    def free_runs(self, tried: Tried, run: int, horizons: Sequence[int]) -> Iterator[FreeRuns]:
+    def free_runs(self, tried: Tried, run: int) -> Iterator[FreeRuns]:
         """Free runs on a run by models of others, side by side, for each horizon that fits.
 
         Runs of other groups teach, if there are any.
@@ -367,10 +346,10 @@ class Problem:
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]] or rest
         if not candidate.has_path:
-            yield from self._fitted_runs(candidate, others, run, horizons)
+            yield from self._fitted_runs(candidate, others, run)
             return
         models = [each for one in tried for each in self.models(*one, others)]
-        read, ahead = self.windows(run, horizons), self.ahead(candidate)
+        read, ahead = self.windows(run), self.ahead(candidate)
         groups = [
             replace(each, delayed=each.delayed[:, : each.delayed.shape[1] - ahead])
             for _, each, _ in read
@@ -381,31 +360,29 @@ class Problem:
         for (starts, _, measured), computed in zip(read, runs, strict=True):
             ours |= zip(starts, computed.swapaxes(0, 1), strict=True)
             truth |= zip(starts, measured, strict=True)
-        for steps in horizons:
+        for steps in self.horizons:
             if at := self.starts(run, steps).tolist():
                 predicted = np.stack([ours[start][:, :steps] for start in at], axis=1)
                 measured = np.stack([truth[start][:steps] for start in at])
                 yield FreeRuns(predicted, measured, models[0].signature.state_scale.std)
 
-    def _fitted_runs(
-        self, candidate: Any, others: Sequence[int], run: int, horizons: Sequence[int]
-    ) -> Iterator[FreeRuns]:
+    def _fitted_runs(self, candidate: Any, others: Sequence[int], run: int) -> Iterator[FreeRuns]:
         """The same of a candidate that is fitted for itself."""
         own, names = self.data.signature, self.data.names
         given = {names[other]: self.runs[names[other]] for other in others}
         candidate = replace(candidate, window=self.widest.window)
         model, judged = candidate.fit(given, own.states, own.inputs), self.runs[names[run]]
         begin = round((self.data.begin(run) - float(judged["time"][0])) / own.dt)
-        for steps in horizons:
+        for steps in self.horizons:
             if (starts := begin + self.starts(run, steps)).size:
                 predicted, measured = model.judged_runs(judged, names[run], starts, steps)
                 yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
 
     def judge(self, tried: Tried, fold: int) -> list[Scores]:
         """Judge free runs on a run that is held out, over all horizons that fit."""
-        scores = list(map(scores_of, self.free_runs(tried, fold, self.horizons)))
+        scores = list(map(scores_of, self.free_runs(tried, fold)))
         counts = [each.shape[1] for each in scores if each.size]
-        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(counts), 1), counts)
+        weights = np.repeat(np.divide(1.0, counts) / len(counts), counts)
         ends = np.cumsum([len(levels) for _, levels in tried])
         nothing = np.empty((ends[-1], 0))
         parts = np.split(np.concatenate([nothing, *scores], axis=1), ends[:-1])
@@ -413,8 +390,9 @@ class Problem:
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others."""
-        for run in range(len(self.groups)) if len(self.groups) > 1 else ():
-            for predicted, measured, _ in self.free_runs([(candidate, [level])], run, [steps]):
+        own = replace(self, horizons=(steps,))
+        for run in range(len(self.groups)):
+            for predicted, measured, _ in own.free_runs([(candidate, [level])], run):
                 yield Held(run, self.starts(run, steps), predicted[0], measured)
 
 
@@ -422,7 +400,6 @@ def _problem(
     widest: HankelSettings,
     given: Given,
     folds: Mapping[str, str] | int,
-    ridges: Iterable[float],
     horizons: tuple[int, ...],
 ) -> Problem | None:
     """The columns of all candidates, which the widest holds; None where the runs are too short.
@@ -441,10 +418,9 @@ def _problem(
         for name, run in runs.items():
             size = run.sizes["time"]
             place = training_window(size - 1, widest.window, before, 0, widest.history)
-            begin = max(place.first_column, before)
-            edges = np.linspace(begin, size - after, folds + 1).astype(int)
+            edges = np.linspace(place.first_column, size - after, folds + 1).astype(int)
             for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
-                samples = slice(max(first - before, 0), stop + after)
+                samples = slice(first - before, stop + after)
                 pieces[f"{name}, part {number}"] = run.isel(time=samples)
         widest = replace(widest, window=None)  # all of the parts, which share it
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
@@ -452,20 +428,19 @@ def _problem(
     known = None if isinstance(folds, int) else chain
     data = gather(pieces, states, inputs, None, widest, known)
     groups = tuple(pieces if isinstance(folds, int) else folds.values())
-    return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
+    return Problem(pieces, groups, data, widest, horizons)
 
 
 def _problems(
     tried: Candidates,
     folds: Mapping[str, str] | int,
-    ridges: Sequence[float],
     horizons: tuple[int, ...],
 ) -> dict[Columns, Problem]:
     """The columns of all that is tried; none where what it starts from is too long."""
     problems: dict[Columns, Problem] = {}
     for key, widest in tried.widest().items():  # that of the base is the first
         try:
-            problem = _problem(widest, tried.given, folds, ridges, horizons)
+            problem = _problem(widest, tried.given, folds, horizons)
         except RequestError:
             if not problems:
                 raise
@@ -493,6 +468,8 @@ class _Trials:
         What is tried.
     problems : mapping
         Columns of the candidates.
+    ridges : tuple of float
+        λ that are tried, in ascending order.
     known : mapping
         As for :func:`select`.
     executor, progress
@@ -507,6 +484,7 @@ class _Trials:
 
     search: Candidates
     problems: Mapping[Columns, Problem]
+    ridges: tuple[float, ...]
     known: Known
     executor: Executor | None
     progress: Progress | None
@@ -518,10 +496,9 @@ class _Trials:
         """The columns of a candidate."""
         return self.problems[self.search.columns(candidate)]
 
-    @property
-    def best(self) -> Any:
-        """The candidate that errs least."""
-        return min(self.made, key=lambda each: self.made[each].best)
+    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
+        """λ that may be tried of a candidate."""
+        return self.ridges if candidate.has_path else (float(candidate.ridge),)
 
     @property
     def tried(self) -> list[tuple[Any, float]]:
@@ -538,7 +515,7 @@ class _Trials:
             tried = step_of(best)
             self.later -= len(tried) - 1  # the best is among them
             self.judge([best, *tried])
-            best = self.best
+            best = min(self.made, key=lambda each: self.made[each].best)
         return best
 
     def judge(self, candidates: Iterable[HankelSettings]) -> None:
@@ -547,50 +524,54 @@ class _Trials:
         Every ``COARSE``-th λ is tried, and of what errs little more than the best those about its
         own.
         """
-        new = [each for each in dict.fromkeys(candidates) if each not in self.made]
-        new = [each for each in new if self.search.columns(each) in self.problems]
-        coarse = {each: self.problem(each).levels(each)[::COARSE] for each in new}
-        self._try(coarse, 2 * self.later + len(new))
+        new = [
+            each
+            for each in dict.fromkeys(candidates)
+            if each not in self.made and self.search.columns(each) in self.problems
+        ]
+        self._try({each: self.levels(each)[::COARSE] for each in new})
         least = NEAR * min((each.best for each in self.made.values()), default=math.inf)
         self.refine([each for each in new if self.made[each].best <= least])
 
     def refine(self, candidates: Iterable[HankelSettings]) -> None:
         """Try the λ of candidates next to the best of those that were tried."""
-        self._try({each: self.made[each].between() for each in candidates}, 2 * self.later)
+        self._try({each: self.made[each].between() for each in candidates})
 
-    def _try(self, levels: Mapping[Any, Sequence[float]], later: int) -> None:
-        """Try λ of candidates, of which so many more parts are to come."""
+    def _try(self, levels: Mapping[Any, Sequence[float]]) -> None:
+        """Try λ of candidates; each has two parts."""
         problem = next(iter(self.problems.values()))
         folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
-        again = sum(each in self.made for each in levels)  # each has two parts
+        keys = {
+            (fold, each): json.dumps([each.to_json(), fold, [*own]], sort_keys=True)
+            for fold, (each, own) in itertools.product(folds, levels.items())
+        }
         batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
-        # The second round begins with the runs that the first one read last.
-        order = folds[::-1] if again else folds
-        for fold, (each, own) in itertools.product(order, levels.items()):
-            if _key(each, fold, own) not in self.known:
+        for (fold, each), key in keys.items():
+            if key not in self.known:
                 alike = fold, self.search.columns(each), each.lead if each.has_path else each
-                batches.setdefault(alike, []).append((each, own))
+                batches.setdefault(alike, []).append((each, levels[each]))
         outcomes = in_order(_judged, self.problems, [*batches.items()], self.executor)
-        done = len(folds) * (2 * len(self.made) - again)
-        total = done + sum(map(len, batches.values())) + len(folds) * later
+        known = len({*self.made, *levels})
+        total = 2 * len(folds) * (known + self.later)
+        done = len(folds) * (len(self.made) + known) - sum(map(len, batches.values()))
         for ((fold, *_), tried), outcome in zip(batches.items(), outcomes, strict=True):
-            for (each, own), judged in zip(tried, outcome, strict=True):
-                self.known[_key(each, fold, own)] = [part.tolist() for part in judged]
+            for (each, _), judged in zip(tried, outcome, strict=True):
+                self.known[keys[fold, each]] = [part.tolist() for part in judged]
             done += len(tried)
             if self.progress is not None:
                 self.progress(done, total, f"candidate and fold {done}")
         for each, own in levels.items():
-            found = [map(np.array, self.known[_key(each, fold, own)]) for fold in folds]
+            found = [map(np.array, self.known[keys[fold, each]]) for fold in folds]
             scores, weights = zip(*found, strict=True)
             joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
             firsts = [problem.groups.index(problem.groups[fold]) for fold in folds]
             groups = np.repeat(firsts, [len(part) for part in weights])
-            every = self.problem(each).levels(each)
-            known = np.full((len(every), joined.size), np.nan)
+            every = self.levels(each)
+            rows = np.full((len(every), joined.size), np.nan)
             if each in self.made:
-                known[:] = self.made[each].scores
-            known[[every.index(level) for level in own]] = np.concatenate(scores, axis=1)
-            self.made[each] = Trial(every, known, joined / joined.sum(), groups)
+                rows[:] = self.made[each].scores
+            rows[[every.index(level) for level in own]] = np.concatenate(scores, axis=1)
+            self.made[each] = Trial(every, rows, joined / joined.sum(), groups)
 
     def stable(self, taken: Any, level: float) -> tuple[Any, float]:
         """A candidate and λ; where that grows, the best of all that do not."""
@@ -608,11 +589,6 @@ class _Trials:
         return "".join(
             f"; without {named(o)} {self.made[less].best:.3f}" for o, less in without.items()
         )
-
-
-def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
-    """What scores of a candidate are known by."""
-    return json.dumps([candidate.to_json(), fold, [*levels]], sort_keys=True)
 
 
 def _judged(problems: Mapping[Columns, Problem], batch: tuple[Alike, Tried]) -> list[Scores]:
@@ -650,12 +626,8 @@ class Selected(Generic[Chosen]):
         keys = ["observables", "lead", "state_delays", "input_delays"]
         often = ("alignment", "memory", "kind")
         keys += [k for k in often if len({row[k] for row in self.rows}) > 1]
-
-        def candidate(row: dict[str, Any]) -> tuple[Any, ...]:
-            return tuple(row[key] for key in keys)
-
         lines = [self.note]
-        for values, part in itertools.groupby(self.rows, candidate):
+        for values, part in itertools.groupby(self.rows, itemgetter(*keys)):
             best = min(part, key=lambda row: (not row["chosen"], row["score"]))
             what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
             lines.append(
@@ -666,17 +638,13 @@ class Selected(Generic[Chosen]):
 
 
 def settle(
-    settings: Settings,
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    **how: Any,
-) -> Selected[Settings]:
+    settings: Any, runs: Datasets, states: Sequence[str], inputs: Sequence[str], **how: Any
+) -> Selected[Any]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
-    settings : HankelSettings
+    settings : HankelDMDc
         What was asked for; its ``select`` says what is chosen beside λ, and how.
     runs, states, inputs
         As in :func:`select`.
@@ -695,15 +663,14 @@ def settle(
     """
     lacking = _lacking(settings, (runs, states, inputs))
     without = f"not aligned to the surge: {lacking}" if lacking else ""
-    stated, chosen = not isinstance(settings.ridge, str), getattr(settings, "select", None)
-    if stated and chosen is None:
+    if not settings.is_open:
         return Selected(settings, (), without)
     if settings.ridge == 0:
         raise RequestError(
             "free runs choose at λ above zero, and ridge = 0 is stated. Set ridge = 'rollout', or "
             "remove select."
         )
-    asked = chosen or Select()
+    asked, stated = settings.select or Select(), not isinstance(settings.ridge, str)
     selected = select(
         settings,
         runs,
@@ -819,7 +786,7 @@ def select(
     base = settings.having(readouts=(), alignment=first)
     whole = Candidates(base, given, samples, step, vary, opened, by_sea, bool(kinds))
     for search in whole.shorter():
-        problems = _problems(search, apart, ridges, horizons)
+        problems = _problems(search, apart, horizons)
         if problems:
             break
     else:  # runs are too short for the shortest
@@ -831,7 +798,9 @@ def select(
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
-    trials = _Trials(search, problems, {} if known is None else known, executor, progress)
+    trials = _Trials(
+        search, problems, tuple(ridges), {} if known is None else known, executor, progress
+    )
     taken, level, words = _chosen(trials, stated, kinds)
     problem = trials.problem(taken)
     readouts = readouts if taken.kind == settings.kind else {}
@@ -1007,9 +976,8 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        is_judged = problem.data.signature.input_map.follows is not None
-        judged = list(problem.held_out(candidate, level, steps)) if is_judged else []
-        return fit_readouts(readouts, problem.data, problem.runs, judged)
+        held = problem.held_out(candidate, level, steps)
+        return fit_readouts(readouts, problem.data, problem.runs, held)
     settings = replace(candidate, ridge=1.0, standardize=True)
     return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
 
@@ -1053,7 +1021,7 @@ def readouts_for(
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
     given = runs, states, inputs
-    problem = _problem(settings, given, apart, (ridge,), (steps,))
+    problem = _problem(settings, given, apart, (steps,))
     return _learnt(readouts, problem, settings, ridge, steps, given)
 
 
@@ -1086,7 +1054,9 @@ def regular_periods(runs: Datasets, inputs: Sequence[str]) -> dict[str, float]:
     periods, step = {}, labelled.common_step(runs)
     for name, run in runs.items():
         wave = labelled.wave_channel(run, inputs, name)
-        series = np.full(1, np.nan) if wave is None else run[wave].values
+        if wave is None:
+            return {}
+        series = run[wave].values
         stated = run.attrs.get("waves") == "regular"
         if not np.isfinite(series).all() or not (stated or is_regular(series)):
             return {}

@@ -479,7 +479,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         data = gather(runs, states, inputs, None, self)
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
-            solution, data, variation = regress_varying(data, self, self.parameter, values)
+            solution, data, variation = regress_varying(data, self, values)
             model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
             return replace(model, variation=variation)
         solution = data.regress(self)
@@ -800,16 +800,15 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         spec = self._taught_by(runs.values(), min(samples) * dt)
         members, centre = draw_members(spec, dt, samples, input_map), spec.centred_on(dt)
         every = members if centre is None else [*members, centre]
-        reads = [
-            (min(draw.first(run, count, input_map) for draw in every), count)
+        firsts = [
+            min(draw.first(run, count, input_map) for draw in every)
             for run, count in enumerate(samples)
         ]
-        arrays = TrainingArrays.read(runs, states, inputs, reads, input_map)
-        parts = zip(runs.items(), reads, strict=True)
+        arrays = TrainingArrays.read(runs, states, inputs, firsts, input_map)
         trained = [
-            labelled.channel_matrix(run, inputs, name, slice(*read))
-            for (name, run), read in parts
-            if read[0] < read[1]
+            labelled.channel_matrix(run, inputs, name, slice(first, None))
+            for (name, run), first in zip(runs.items(), firsts, strict=True)
+            if first < run.sizes["time"]
         ]
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.
@@ -819,22 +818,16 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             series = zip(*departing(zip(*series, strict=True), input_map), strict=True)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
-        scales = [
-            moments(each, None, group, standardize=False)
+        x, u, w = (
+            moments(each, group, standardize=False)
             for each, group in zip(series, groups, strict=True)
-        ]
-        signature = Signature(
-            dt=dt,
-            state_labels=labels[0],
-            input_labels=labels[1],
-            state_delays=max(draw.settings.state_reach for draw in every),
-            input_delays=max(draw.settings.input_delays for draw in every),
-            input_map=replace(input_map, reference=shared.centre),
-            state_scale=scales[0],
-            input_scale=scales[1],
-            direct_scale=scales[2],
-            readouts=readouts,
         )
+        reach = (
+            max(draw.settings.state_reach for draw in every),
+            max(draw.settings.input_delays for draw in every),
+        )
+        input_map = replace(input_map, reference=shared.centre)
+        signature = Signature(dt, *labels, *reach, input_map, x, u, w, readouts=readouts)
         return HankelEnsemble(
             settings=shared,
             origin=spec.to_json(),

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.core import gram
 from seakeep.core.embedding import (
     History,
@@ -110,13 +110,22 @@ class TrainingData:
         x, u, w = (scale.physical(values[run]) for scale, values in groups)
         return x, u, w
 
+    def of(self, runs: Iterable[int], settings: HankelSettings) -> TrainingData:
+        """Some of the runs, on deviations from their own moments."""
+        own = self.signature
+        pieces = [
+            Piece(self.names[run], self.physical(run), self.windows[run], self.instants[run])
+            for run in runs
+        ]
+        labels = own.state_labels, own.input_labels
+        return _standardised(pieces, own.dt, labels, own.input_map, replace(settings, centre=0))
+
     def regress(self, settings: HankelSettings) -> Solution:
         """Rows of the next states, or of all delayed ones, from these data.
 
         Means over blocks of delayed states enter as regressors without delays; the rows that are
         returned spread them over these delays.
         """
-        blocks = settings.blocks
         solution = identify(
             self.states,
             self.delayed,
@@ -130,9 +139,7 @@ class TrainingData:
             all_rows=settings.delay_rows == "ridge",
             radius=settings.radius,
         )
-        count = len(self.signature.states)
-        if not blocks:
-            return solution
+        count, blocks = len(self.signature.states), settings.blocks
         spread = spread_means(solution.coefficients, count, settings.state_delays, blocks)
         return replace(solution, coefficients=spread)
 
@@ -154,8 +161,6 @@ def with_means(
     settings: HankelSettings, states: Sequence[FloatArray], direct: Sequence[FloatArray]
 ) -> list[FloatArray]:
     """Direct regressors of each run, and the means over blocks of its delayed states."""
-    if not settings.blocks:
-        return [*direct]
     return [
         np.concatenate([own, block_means(x, settings.blocks)], axis=1)
         for own, x in zip(direct, states, strict=True)
@@ -306,8 +311,8 @@ def departures(
     """
     out, zeros = [], []
     for each, window in zip(series, windows, strict=True):
-        first = window.first, window.first, max(window.first, window.first_column)
-        means = [x[at : window.last + 1].mean(axis=0) for x, at in zip(each, first, strict=True)]
+        cuts = zip(each, _counted(window), strict=True)
+        means = [values[own].mean(axis=0) for values, own in cuts]
         if input_map.follows is not None:
             means[0][input_map.follows.column] = means[2][-1] = 0.0
         out.append(tuple(values - mean for values, mean in zip(each, means, strict=True)))
@@ -353,20 +358,20 @@ class TrainingArrays:
         runs: Datasets,
         states: Sequence[str],
         inputs: Sequence[str],
-        samples: Sequence[tuple[int, int]],
+        firsts: Sequence[int],
         input_map: InputMap,
     ) -> Self:
-        """Samples from the first to before the second of each run."""
+        """Samples of each run from the first that a member reads on."""
         read = []
-        for (name, run), (first, end) in zip(runs.items(), samples, strict=True):
+        for (name, run), first in zip(runs.items(), firsts, strict=True):
             time = np.asarray(run["time"].values, dtype=float)
-            x = labelled.channel_matrix(run, states, name, slice(first, end))
-            labelled.check_finite(x, states, run, name, first)
+            end = time.size
+            x = labelled.sound_matrix(run, states, name, slice(first, None))
             span = Span(first, end - 1, max(end - input_map.lead_samples, first))
             u, v = run_regressors(input_map, run, states, inputs, name, span)
             for values in (x, u, v):
                 values.flags.writeable = False
-            read.append((name, x, u, v, first, float(time[min(first, time.size - 1)])))
+            read.append((name, x, u, v, first, float(time[min(first, end - 1)])))
         return cls(*zip(*read, strict=True))
 
     def without(self, run: int) -> Self:
@@ -426,8 +431,6 @@ def run_regressors(
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
     rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
-    if not missing:
-        return rows
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
@@ -495,10 +498,8 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def _stops_by_run(stop: Stop, names: list[str]) -> dict[str, Any]:
+def _stops_by_run(stop: Any, names: list[str]) -> dict[str, Any]:
     """Last instant of each run's window as the user gave it; None for the run's end."""
-    if stop is None:
-        return dict.fromkeys(names)
     if isinstance(stop, Mapping):
         unknown = [name for name in stop if name not in names]
         if unknown:
@@ -508,7 +509,7 @@ def _stops_by_run(stop: Stop, names: list[str]) -> dict[str, Any]:
             )
         return {name: stop.get(name) for name in names}
     if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = list(cast("list[Any]", stop))
+        values = list(stop)
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
@@ -567,28 +568,34 @@ def scales_of(
 ) -> tuple[Scale, Scale, Scale]:
     """Moments of states, delayed and direct regressors.
 
-    What regressors are divided by is stretched where λ weighs more on them. Direct ones count from
-    the first snapshot pair on: before it they may need inputs that are not there.
+    What regressors are divided by is stretched where λ weighs more on them.
     """
-    later = windows
-    if channels[2]:
-        later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
+    counted = zip(*map(_counted, windows), strict=True)
     x, u, w = (
-        moments(values, spans, labels, standardize)
-        for values, spans, labels in zip(series, (windows, windows, later), channels, strict=True)
+        moments([values[own] for values, own in zip(every, cut, strict=True)], labels, standardize)
+        for every, cut, labels in zip(series, counted, channels, strict=True)
     )
     if stretch is not None and standardize:
         u, w = (replace(own, std=own.std * by) for own, by in zip((u, w), stretch, strict=True))
     return x, u, w
 
 
+def _counted(window: TrainingWindow) -> tuple[slice, slice, slice]:
+    """Samples of states, delayed and direct regressors that moments are taken of.
+
+    Direct ones count from the first snapshot pair on: before it they may need inputs that are not
+    there.
+    """
+    first = max(window.first, window.first_column)
+    return window.samples, window.samples, slice(first, window.last + 1)
+
+
 def moments(
     series: Sequence[FloatArray],
-    windows: Sequence[TrainingWindow] | None,
     labels: Sequence[ChannelLabel],
     standardize: bool,
 ) -> Scale:
-    """Means and standard deviations (ddof = 1) over the windows of all runs, or all of them.
+    """Means and standard deviations (ddof = 1) over all runs.
 
     Raises
     ------
@@ -597,11 +604,9 @@ def moments(
     """
     if not labels:
         return Scale(*np.zeros((5, 0)))
-    if windows is not None:
-        series = [values[window.samples] for values, window in zip(series, windows, strict=True)]
     # Sums along contiguous memory take half the time.
     pooled = np.ascontiguousarray(np.concatenate(list(series)).T)
-    with np.errstate(over="ignore"):
+    with undefined():
         mean = pooled.sum(axis=1) / pooled.shape[1]
         centred = pooled - mean[:, None]
         spread = np.sqrt(np.einsum("ct,ct->c", centred, centred) / (pooled.shape[1] - 1))

@@ -6,9 +6,9 @@ Slow motions of which a training window holds too few cycles to estimate mean an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntFlag
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,8 @@ PER_OCTAVE = 6
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
+FAR = 2.0
+"""Training SDs that the mean of an input may lie from that of training."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
 
@@ -35,8 +37,9 @@ CYCLES = 5.0
 class Validity(IntFlag):
     """What lies outside the training; 0 where nothing does.
 
-    Period, height and steepness are those of waves, and surge is its mean. In service consistency
-    is that of errors of late, and lost says that waves a forecast reads were filled for long.
+    Period, height and steepness are those of waves, mean is that of an input, and surge that of
+    the surge. In service consistency is that of errors of late, and lost says that waves a forecast
+    reads were filled for long.
     """
 
     PERIOD = 1
@@ -45,6 +48,7 @@ class Validity(IntFlag):
     SURGE = 8
     CONSISTENCY = 16
     LOST = 32
+    MEAN = 64
 
     @property
     def words(self) -> str:
@@ -68,6 +72,10 @@ class Conditions:
         As those of :class:`Coverage`.
     reasons : ndarray of bool, shape (3, channel)
         Whether period, height and steepness lie outside.
+    means : ndarray, shape (channel,)
+        Mean of each input.
+    centre, spread : ndarray, shape (channel,)
+        Mean and standard deviation of each input in training.
     surge : float or None
         Mean, m.
     reach : ndarray, shape (2,)
@@ -82,6 +90,9 @@ class Conditions:
     heights: FloatArray
     steepnesses: FloatArray
     reasons: BoolArray
+    means: FloatArray
+    centre: FloatArray
+    spread: FloatArray
     surge: float | None
     reach: FloatArray
     units: tuple[str, ...]
@@ -90,11 +101,17 @@ class Conditions:
         return f"{type(self).__name__}({'; '.join(self.sentences()) or self.validity.words})"
 
     @property
+    def departs(self) -> BoolArray:
+        """Whether the mean of each input lies far from that of training; not of a constant one."""
+        return (np.abs(self.means - self.centre) > FAR * self.spread) & (self.spread > 0.0)
+
+    @property
     def validity(self) -> Validity:
         """What lies outside the training."""
         drifts = self.surge is not None and not self.reach[0] <= self.surge <= self.reach[1]
         yes = np.append(self.reasons.any(axis=1), drifts)
-        return Validity(int(yes @ 2 ** np.arange(4)))
+        mean = Validity.MEAN if self.departs.any() else 0
+        return Validity(int(yes @ 2 ** np.arange(4))) | mean
 
     @property
     def beyond(self) -> float:
@@ -112,14 +129,17 @@ class Conditions:
             "trained_steepness": self.trained.steepnesses,
             "period": self.trained.periods[self.peak],
             "unseen_energy": self.unseen,
+            "mean": self.means,
+            "trained_mean": self.centre,
+            "trained_std": self.spread,
         }
         if self.surge is not None:
             out |= {"mean_surge": self.surge, "trained_surge": self.reach}
         return out
 
     def sentences(self) -> list[str]:
-        """A sentence for each reason: periods, heights, steepnesses, mean surge."""
-        texts: list[list[str]] = [[], [], []]
+        """A sentence for each reason: periods, heights, steepnesses, means, mean surge."""
+        texts: list[list[str]] = [[], [], [], []]
         for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
             peak, periods = self.peak[at], self.trained.periods
             known, trained = self.trained.known[at], np.flatnonzero(self.trained.taught[at])
@@ -143,6 +163,12 @@ class Conditions:
                         f"{channel}: a {what} of {values[at]:.3g}{of}, trained up to "
                         f"{most[at]:.3g}{of}"
                     )
+            if self.departs[at]:
+                low, high = self.centre[at] + FAR * self.spread[at] * np.array([-1.0, 1.0])
+                texts[3].append(
+                    f"{channel}: a mean of {self.means[at]:.3g} {unit}, trained from {low:.3g} to "
+                    f"{high:.3g} {unit} (mean and {FAR:g} SD)"
+                )
         lines = ["; ".join(each) for each in texts if each]
         if Validity.SURGE in self.validity:
             assert self.surge is not None
@@ -169,18 +195,6 @@ class Coverage:
     heights, steepnesses : ndarray, shape (channel,)
         Largest ones of a window: four SDs, of regular waves 2√2, and that over the length in deep
         water of a wave of the mean period.
-
-    Attributes
-    ----------
-    edges : ndarray, shape (band + 1,)
-        Edges of the bands, Hz.
-    periods : ndarray, shape (band,)
-        Middle of each band, s.
-    taught, known : ndarray of bool, shape (channel, band)
-        Bands that were trained, and those with the bands beside them: the leakage of a taper
-        reaches there.
-    elevations : ndarray of bool, shape (channel,)
-        Inputs that are wave elevations.
     """
 
     channels: tuple[str, ...]
@@ -188,23 +202,35 @@ class Coverage:
     shares: FloatArray
     heights: FloatArray
     steepnesses: FloatArray
-    edges: FloatArray = field(init=False, repr=False)
-    periods: FloatArray = field(init=False, repr=False)
-    taught: BoolArray = field(init=False, repr=False)
-    known: BoolArray = field(init=False, repr=False)
-    elevations: BoolArray = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        edges = 2.0 ** ((self.first + np.arange(self.shares.shape[1] + 1)) / PER_OCTAVE)
-        taught = self.shares >= TRAINED
-        known = taught.copy()
-        known[:, 1:] |= taught[:, :-1]
-        known[:, :-1] |= taught[:, 1:]
-        elevations = np.array([is_elevation(each) for each in self.channels], dtype=bool)
-        periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
-        made = {"edges": edges, "periods": periods, "taught": taught, "known": known}
-        for name, value in (made | {"elevations": elevations}).items():
-            object.__setattr__(self, name, value)
+    @cached_property
+    def edges(self) -> FloatArray:
+        """Edges of the bands, Hz, shape (band + 1,)."""
+        bands = self.first + np.arange(self.shares.shape[1] + 1)
+        return 2.0 ** (bands / PER_OCTAVE)
+
+    @cached_property
+    def periods(self) -> FloatArray:
+        """Middle of each band, s, shape (band,)."""
+        return 1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])
+
+    @cached_property
+    def taught(self) -> BoolArray:
+        """Bands that were trained, shape (channel, band)."""
+        return self.shares >= TRAINED
+
+    @cached_property
+    def known(self) -> BoolArray:
+        """Those, and the bands beside them: the leakage of a taper reaches there."""
+        known = self.taught.copy()
+        known[:, 1:] |= self.taught[:, :-1]
+        known[:, :-1] |= self.taught[:, 1:]
+        return known
+
+    @cached_property
+    def elevations(self) -> BoolArray:
+        """Inputs that are wave elevations, shape (channel,)."""
+        return np.array([is_elevation(each) for each in self.channels], dtype=bool)
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -245,7 +271,8 @@ class Coverage:
         Judged are those that are `waves`, by their places; by default all.
 
         The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
-        tenth, are no reason. What moves for five periods or less is not judged.
+        tenth, are no reason. What moves for five periods or less is not judged. The mean is, also
+        of what is no wave, from two periods of the waves on.
         """
         dt = signature.dt
         energy = band_energy(inputs, dt, self.first, self.shares.shape[1])
@@ -272,13 +299,18 @@ class Coverage:
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         units = tuple(label.units for label in signature.input_labels)
-        return Conditions(self, peak, unseen, heights, steepnesses, reasons, mean, reach, units)
+        trained = signature.input_scale.part(slice(len(self.channels)))
+        means = inputs.mean(axis=0) if len(inputs) > 8 * self.quarter(dt) else trained.centre
+        moments = means, trained.centre, trained.spread
+        return Conditions(
+            self, peak, unseen, heights, steepnesses, reasons, *moments, mean, reach, units
+        )
 
 
 def outside_training(
     model: Any, run: xr.Dataset, start: float, steps: int, surge: FloatArray | None = None
 ) -> list[str]:
-    """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
+    """Say in what a forecast lies outside the training: period, height, steepness, means.
 
     Parameters
     ----------
@@ -296,7 +328,7 @@ def outside_training(
     Returns
     -------
     list of str
-        A sentence for each reason; none where the forecast is shorter than five periods.
+        A sentence for each reason; of waves none where it is shorter than five periods.
     """
     coverage: Coverage | None = getattr(model, "coverage", None)
     if coverage is None or not coverage.channels:
@@ -424,9 +456,10 @@ def slow_motions(
             if not np.all(np.isfinite(values)) or len(values) * dt < shortest:
                 continue
             low = split_bands(values, dt, 1.0 / (SPLIT * encounter_period))[0][:, 0]
-            crossings += int(np.sum(np.diff(np.sign(low - low.mean())) != 0))
+            low -= low.mean()
+            crossings += int(np.count_nonzero(np.diff(np.sign(low))))
             seconds += len(values) * dt
-            slow += float(np.sum((low - low.mean()) ** 2))
+            slow += float(np.sum(low**2))
             whole += float(np.sum((values - values.mean()) ** 2))
         if not whole > 0 or slow <= GOVERNS * whole:
             continue

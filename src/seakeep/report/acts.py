@@ -180,19 +180,15 @@ def _ratio(statistic: Statistic) -> Statistic:
     return ratio
 
 
-def _against_single(act: Evidence, statistic: Statistic = _median) -> dict[str, Interval]:
+def _against_single(act: Evidence, statistic: Statistic = _median) -> list[Interval]:
     """A statistic of the ensemble over that of the single model, in both measures."""
-    return {
-        words: act.interval(
-            _ratio(statistic), *(act.cells((), key, model) for model in (ENSEMBLE, SINGLE))
-        )
-        for key, words in HEADING.items()
-    }
+    pairs = ((act.cells((), key, model) for model in (ENSEMBLE, SINGLE)) for key in HEADING)
+    return [act.interval(_ratio(statistic), *pair) for pair in pairs]
 
 
-def _changes(ratios: Mapping[str, Interval]) -> str:
+def _changes(nrmse: Interval, nammae: Interval) -> str:
     """Text of the changes of both measures."""
-    return ", ".join(f"{words} {each.change()}" for words, each in ratios.items())
+    return f"ANRMSE {nrmse.change()}, NAMMAE {nammae.change()}"
 
 
 def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
@@ -251,11 +247,13 @@ class Claims(Evidence):
         return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
     def _who_errs(self) -> Judged:
-        shares = {words: _share(self, key, LOADS) for key, words in HEADING.items()}
-        listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
+        nrmse, nammae = (_share(self, key, LOADS) for key in HEADING)
         slow = _share(self.raw, "nrmse", SLOW).part()
-        words = f"loads make {listed}; act (b): surge and loads {slow} of ANRMSE"
-        return words, all_of(each.above(0.5) for each in shares.values())
+        words = (
+            f"loads make {nrmse.part()} of ANRMSE, {nammae.part()} of NAMMAE; act (b): surge and "
+            f"loads {slow} of ANRMSE"
+        )
+        return words, all_of([nrmse.above(0.5), nammae.above(0.5)])
 
     def _load_divergence(self) -> Judged:
         at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
@@ -277,14 +275,14 @@ class Claims(Evidence):
         return words, share.above(ALMOST)
 
     def _better(self, statistic: Statistic = _median) -> Judged:
-        differences = _against_single(self, statistic=statistic)
-        return _changes(differences), all_of(each.below(1.0) for each in differences.values())
+        changes = _against_single(self, statistic)
+        return _changes(*changes), all_of(each.below(1.0) for each in changes)
 
     def _always_better(self) -> Judged:
         differences = [
             each.below(1.0)
             for test in self.result.tests
-            for each in _against_single(self.among(test)).values()
+            for each in _against_single(self.among(test))
         ]
         better, worse, unknown = map(differences.count, (True, False, None))
         words = (
@@ -309,9 +307,9 @@ class Claims(Evidence):
         both = test["measured"].values, self.raw.ordered(test["mean"])
         measured, forecast = (split_bands(values, result.dt, edge)[0] for values in both)
         errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-        of = {line: self.raw.interval(_median, errors[..., [k]]) for k, line in enumerate(LOADS)}
-        words = [f"{line.removeprefix('mooring_')} {each.text()}" for line, each in of.items()]
-        return f"act (b): {', '.join(words)}", all_of(each.below(1.0) for each in of.values())
+        bow, stern = (self.raw.interval(_median, errors[..., [k]]) for k in range(2))
+        words = f"act (b): bow {bow.text()}, stern {stern.text()}"
+        return words, all_of([bow.below(1.0), stern.below(1.0)])
 
     def _peaks(self) -> Judged:
         loads = self.error(LOADS, "nammae")
@@ -328,21 +326,14 @@ class Claims(Evidence):
     def _against_irregular(self) -> Judged:
         both = self.among(*SEA, *REGULAR)
         sizes = [test.sizes["window"] for test in both.tests]
-        regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)[None]
-
-        def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
-            averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
-            ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
-            return ours / sea
-
-        differences = {}
-        for key, words in HEADING.items():
+        is_regular = np.repeat([False, *[True] * len(REGULAR)], sizes)[:, None]
+        changes = []
+        for key in HEADING:
             cells = both.cells((), key)
-            labels = np.broadcast_to(regular, cells.shape[:2])
-            differences[words] = both.interval(ratio, cells, labels)
-        return _changes(differences), all_of(
-            [differences["ANRMSE"].above(1.0), differences["NAMMAE"].below(1.0)]
-        )
+            parts = (np.where(part, cells, np.nan) for part in (is_regular, ~is_regular))
+            changes.append(both.interval(_ratio(_median), *parts))
+        nrmse, nammae = changes
+        return _changes(nrmse, nammae), all_of([nrmse.above(1.0), nammae.below(1.0)])
 
     def _phase(self) -> Judged:
         leads = [np.abs(phase_leads(self.result.groups, test, ENSEMBLE)) for test in REGULAR]
@@ -367,8 +358,8 @@ class Claims(Evidence):
         return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
 
     def _stable(self) -> Judged:
-        both = (self.variant("radius", each) for each in ("ridge", "none"))
-        ours, none = (self.interval(_middle, each) for each in both)
+        radii = (self.variant("radius", each) for each in ("ridge", "none"))
+        ours, none = (self.interval(_middle, each) for each in radii)
         words = f"spectral radius {ours.text()} with λ, {none.text()} without"
         return words, all_of([ours.below(1.0), none.above(1.0)])
 
@@ -420,7 +411,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         drawing("acts", acts_figure, results),
         replace(short, note=f"{short.note} {still_water(results)}"),
         more=(finding(results), against_filter(results), NOTE),
-        points=[f"{act.title}. {act.sentence}" for act in _played(results)],
+        points=[f"{act.title}. {act.sentence}" for act, _ in _played(results)],
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each)),
     )
@@ -429,7 +420,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         sections.append(section("claims", claims_table(results)))
     divergence = divergence_table(first, "bayesian", "paper")
     title = "Divergence of the densities, beside the paper's"
-    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
+    links = [(f"{act.name}/report.html", act.title) for act, _ in _played(results)]
     sections += [
         section("channels", acts_table(results)),
         Section("densities", title, tables=(divergence,)),
@@ -439,8 +430,8 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
 
 
-def _played(results: Results) -> list[Act]:
-    return [act for act in ACTS if act.name in results]
+def _played(results: Results) -> list[tuple[Act, StudyResult]]:
+    return [(act, results[act.name]) for act in ACTS if act.name in results]
 
 
 def short_table(results: Results) -> Table:
@@ -462,8 +453,7 @@ def short_table(results: Results) -> Table:
         for act, model, said in (*WORDS["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
-    first = results[last]
-    seas = [*map(first.sea_of, first.tests)]
+    seas = map(results[last].sea_of, results[last].tests)
     return table("short", rows, columns=("model", *seas))
 
 
@@ -485,14 +475,11 @@ def finding(results: Results) -> str:
 
 def against_filter(results: Results) -> str:
     """How the error differs between models and the filter beside them, in one sentence."""
-    parts = []
-    for act in _played(results):
-        at = (
-            results[act.name]
-            .groups["statistics/differences"]
-            .sel(test=SEA[0], model=SINGLE, other="fir", measure="nrmse", channel="average")
-        )
-        parts.append(f"{ratio_of(at).change()} in {act.letter}")
+    at = {"test": SEA[0], "model": SINGLE, "other": "fir", "measure": "nrmse", "channel": "average"}
+    parts = [
+        f"{ratio_of(result.groups['statistics/differences'].sel(at)).change()} in {act.letter}"
+        for act, result in _played(results)
+    ]
     return (
         "From the filter with the same data, look-ahead and input map (FIR, its length and λ "
         "chosen by validation) to the single model, the median error there changes by "
@@ -531,17 +518,12 @@ def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
 
 def acts_table(results: Results) -> Table:
     """Median errors of every model of every act, per sea, of wave-frequency and slow channels."""
-    first = next(iter(results.values()))
-    rows = [
-        (act.letter, model_words(model), *chain(*_pairs(results[act.name], model)))
-        for act in _played(results)
-        for model in results[act.name].models
-    ]
-    seas = [*map(first.sea_of, first.tests)]
-    conditions = [
-        f"{act.letter}:{words}"
-        for act in _played(results)
-        if (words := conditional(results[act.name], results[act.name].models))
-    ]
+    rows, conditions, seas = [], [], []
+    for act, result in _played(results):
+        seas = [*map(result.sea_of, result.tests)]
+        for model in result.models:
+            rows.append((act.letter, model_words(model), *chain(*_pairs(result, model))))
+        if words := conditional(result, result.models):
+            conditions.append(f"{act.letter}:{words}")
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
     return table("acts", rows, more=" ".join(conditions), columns=columns)

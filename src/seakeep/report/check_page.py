@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,11 @@ import xarray as xr
 from seakeep.check import Checked
 from seakeep.conventions import displayed
 from seakeep.report.figures import checks
-from seakeep.report.page import Section, drawing, section, write_page
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
     WORDS,
-    Interval,
     Number,
     Table,
     entries,
@@ -27,6 +25,7 @@ from seakeep.report.tables import (
     numbers,
     percent,
     probability,
+    ratio_of,
     row,
     short,
     table,
@@ -130,8 +129,8 @@ def _verdict(one: xr.Dataset) -> tuple[float, str]:
 
 def _change(one: xr.Dataset, baseline: str) -> Number:
     """Interval of the change from a baseline."""
-    at = one.sel(model=baseline)
-    return Interval(*(1 + float(at[f"change{end}"]) for end in ("", "_lower", "_upper"))).cells()[1]
+    at = one.sel(model=baseline).rename(change_lower="lower", change_upper="upper")
+    return ratio_of(at).cells()[1]
 
 
 def _by_run(result: xr.Dataset, one: str) -> Table:
@@ -324,7 +323,7 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
         )
     rows = []
     for own in entries(modes, "mode"):
-        shares = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
+        shares = own["participation"].to_series().nlargest(2)
         taking = ", ".join(f"{state} {part:.2f}" for state, part in shares.items())
         rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
     figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
@@ -408,10 +407,8 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     if "offset" in result:
         shown = _as_shown(result, "slow_response", "offset", "offset_uncertainty")
         for own in entries(shown.dropna("state", how="all", subset=["slow_response"]), "state"):
-            mean = own["slow_response"][0]
-            beyond, points = {"left": np.nan, "right": np.nan}, own["point_frequency"]
-            model = np.interp(points, mean["frequency"], mean, **beyond)
-            for at in entries(own.assign(model=("point", model)), "point"):
+            model = own["slow_response"][0].interp(frequency=own["point_frequency"])
+            for at in entries(own.assign(model=model), "point"):
                 offset = uncertain(at["offset"], at["offset_uncertainty"])
                 rows.append((*row(at, "shown", "run", point_frequency=3, model=4), offset))
     figure = drawing("drift", checks.drift, result)
@@ -443,8 +440,3 @@ def check_sections(checked: Checked) -> list[Section]:
         texts += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
         out.append(replace(built, notices=texts))
     return out
-
-
-def write_check(checked: Checked, folder: Path, title: str, description: str) -> Path:
-    """Write ``report.html`` with ``figures/`` and ``tables/`` into a folder; return the page."""
-    return write_page(folder, title, {"description": description}, check_sections(checked))

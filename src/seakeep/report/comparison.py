@@ -6,7 +6,6 @@ Table of the margins of a calibrated band.
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +31,7 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
+    shorter,
     write_frame,
 )
 
@@ -53,13 +53,10 @@ def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
             if key in at
         ]
         yield _by_channel(at, "comparison", title, columns, _note(at))
-        bounds = [
-            [f"{head}, 95 %", *(interval(one, key) for one in entries(at, "channel")), of_all]
-            for head, key, of_all in (
-                ("NRMSE", "nrmse", interval(at, "anrmse")),
-                ("NAMMAE", "nammae", interval(at, "mean_nammae")),
-            )
-        ]
+        bounds = []
+        for key, mean in (("nrmse", "anrmse"), ("nammae", "mean_nammae")):
+            each = (interval(one, key) for one in entries(at, "channel"))
+            bounds.append([f"{key.upper()}, 95 %", *each, interval(at, mean)])
         yield _by_channel(at, "intervals", "intervals over blocks of the forecast", bounds)
         yield _extremes(at, "extremes")
 
@@ -75,10 +72,10 @@ def _by_channel(
     at: xr.Dataset, name: str, title: str, columns: Iterable[Iterable[str]], note: str = ""
 ) -> Table:
     """A row per channel of a run, and one of averages where columns have it; headings first."""
-    run, names = at["run"].values, ["channel", *map(str, at["channel"].values)]
-    every = list(map(list, columns))
-    averages = range(len(names) - 1, len(every[0]) - 1)
-    heads, *rows = zip([*names, *["average"] * len(averages)], *every, strict=True)
+    run, names = at["run"].values, [*map(str, at["channel"].values)]
+    # Columns without an average end before its row.
+    heads, *rows = zip(["channel", *names, "average"], *columns, strict=False)
+    averages = range(len(names), len(rows))
     return Table(f"{name}_{run}", f"{run}: {title}", heads, rows, note, averages=averages)
 
 
@@ -134,7 +131,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     if len(runs) > 1:
         of = f"{len(runs)} runs"
         rows = [
-            (*row(at, "run", wave_period=partial(short, digits=3)), *numbers(at["anrmse"]))
+            (*row(at, "run", wave_period=shorter), *numbers(at["anrmse"]))
             for at in entries(table.sortby("wave_period"), "run")
         ]
         rows.append(("mean", "", *numbers(table["all_anrmse"])))
@@ -157,9 +154,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     """
     if not np.isfinite(table["all_anrmse"]).any():
         return "No model could be judged."
-    first, ratios = table["model"].values[0], {}
-    for at in entries(table.sortby("all_anrmse"), "model"):  # what cannot be judged comes last
-        ratios[at["model"].item()] = ratio_of(at, "all_").cells()
+    first, ordered = table["model"].values[0], table.sortby("all_anrmse")  # not judged: last
+    ratios = {at["model"].item(): ratio_of(at, "all_").cells() for at in entries(ordered, "model")}
     name = next(iter(ratios))
     said = f"Least error: {name}, ANRMSE {number(table['all_anrmse'].min())}"
     if name != first:
@@ -221,11 +217,10 @@ def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
             f"errors in training SD over {of_model.attrs['starts']} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"
         )
-        most = number(lead[-1])
+        most, end = Number(f"at least {number(lead[-1])}"), lead[-1] - 1e-9
         for at in entries(of_model, "run"):
-            times = zip(numbers(at["lead_time"]), at["lead_time"] >= lead[-1] - 1e-9, strict=True)
             columns = [
-                ["lead time s", *(Number(f"at least {most}") if end else t for t, end in times)],
+                ["lead time s", *(most if t >= end else number(t) for t in at["lead_time"])],
                 *([f"at {number(lead[k])} s", *numbers(at["error"].isel(lead=k))] for k in places),
                 ["in band %", *numbers(at["coverage"].mean("lead"), 0)],
             ]
@@ -271,7 +266,7 @@ def forecast_header(states: Sequence[str]) -> str:
 
 def look_ahead_words(seconds: float) -> str:
     """How far a forecast reads the waves, as a clause; empty without a look-ahead."""
-    return f"reads the waves up to {seconds:.3g} s after each instant" if seconds > 0.0 else ""
+    return f"reads the inputs up to {seconds:.3g} s after each instant" if seconds > 0.0 else ""
 
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:

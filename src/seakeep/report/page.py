@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, templates, write_text
 from seakeep.report.style import Figure, figure_style, save_figure
-from seakeep.report.tables import WORDS, Table, parts_of, shade, write_csv, write_latex
+from seakeep.report.tables import WORDS, Table, parts_of, shade, with_minus, write_csv, write_latex
 from seakeep.study.store import storing
 
 UNFINISHED = f"""<!DOCTYPE html>
@@ -172,20 +172,20 @@ def write_page(
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
             drawn[drawing.name] = _drawn(drawing, folder / "figures")
         content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": True}
-        write_text(page, rendered("report.html", kind="report", title=title, **content))
+        write_text(page, rendered(kind="report", title=title, **content))
     tell(len(drawings), len(drawings), "report written")
     return page
 
 
-def rendered(template: str, **content: Any) -> str:
-    """Page of a template of ``seakeep.report.templates``; what is not ours is escaped."""
+def rendered(**content: Any) -> str:
+    """Text of a page; what is not ours is escaped."""
     folder = resources.files("seakeep.report").joinpath("templates")
     environment = templates("report")
     environment.globals["source"] = lambda name: Markup(folder.joinpath(name).read_text("utf-8"))
     environment.filters["shade"] = shade
     environment.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
-    environment.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    return environment.get_template(template).render(**content)
+    environment.filters["minus"] = with_minus
+    return environment.get_template("report.html").render(**content)
 
 
 def inline_picture(png: bytes, words: str) -> Markup:

@@ -33,8 +33,7 @@ def channel_rows(run: xr.Dataset) -> Iterator[tuple[str, ...]]:
     findings = findings_of(run)
     for name, channel in run.data_vars.items():
         factor, unit = displayed(channel.attrs.get("units", ""))
-        values = channel.values[np.isfinite(channel.values)]
-        numbers = pd.Series(factor * values).agg(["min", "max", "mean", "std"])
+        numbers = pd.Series(factor * channel.values).agg(["min", "max", "mean", "std"])
         flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).values.astype(int)
         flagged = ", ".join(
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
@@ -92,9 +91,8 @@ def write_quality_sheet(
         for name, path in pictures.items()
     }
     page = folder / "quality.html"
-    title = f"Data quality: {title}"
-    content = {"title": title, "stamp": {}, "sections": sections, "drawn": drawn, "files": False}
-    write_text(page, rendered("report.html", kind=SHEET, **content))
+    content = {"stamp": {}, "sections": sections, "drawn": drawn, "files": False}
+    write_text(page, rendered(kind=SHEET, title=f"Data quality: {title}", **content))
     return [page, *pictures.values()]
 
 

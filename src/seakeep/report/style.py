@@ -101,7 +101,7 @@ def panels(
         for spare in every[count:]:
             spare.remove()
         return figure, every[:count]
-    given = np.ravel(np.array(axes, dtype=object)).tolist()
+    given = np.ravel([axes]).tolist()
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
@@ -225,11 +225,11 @@ def short_label(channel: str) -> str:
 
     Examples
     --------
-    >>> short_label("pitch_rate"), short_label("torque")
-    ('$\\dot{\\theta}$', 'torque')
+    >>> short_label("pitch_rate"), short_label("torque"), short_label("cost_in_$")
+    ('$\\dot{\\theta}$', 'torque', 'cost in \\$')
     """
     known = canonical_channel(channel)
-    return f"${known.symbol}$" if known else wrapped(channel.replace("_", " "))
+    return f"${known.symbol}$" if known else plain_text(wrapped(channel.replace("_", " ")))
 
 
 def plain_text(words: str) -> str:

@@ -103,12 +103,12 @@ def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any)
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key], **given}
+    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key]}
     entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
     for part in ("title", "note"):
         entry[part] = entry[part].format(**given)
     entry["note"] += more
-    return Table(rows=rows, **parts_of(Table, entry))
+    return Table(rows=rows, **parts_of(Table, entry | given))
 
 
 def parts_of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -173,6 +173,10 @@ def short(value: SupportsFloat, digits: int = 4) -> Number:
     """
     value = float(value)
     return Number(f"{value:.{digits}g}") if np.isfinite(value) else MISSING
+
+
+shorter = partial(short, digits=3)
+"""Text of a number of three significant digits."""
 
 
 def small_number(value: SupportsFloat) -> Number:
@@ -322,7 +326,7 @@ class Interval(NamedTuple):
         words = {True: "better", False: "worse", None: "cannot tell"}[self.below(1.0)]
         if max(abs(self.lower - 1.0), abs(self.upper - 1.0)) < 0.005:
             words = "as good"
-        form, unit = (TIMES, "times") if self.is_multiple else (_relative, "%")
+        form, unit = (shorter, "times") if self.is_multiple else (_relative, "%")
         texts = (to(ratios, form) for ratios in (self[:1], self[1:]))
         value, bounds = (each if each == MISSING else Number(f"{each} {unit}") for each in texts)
         return value, bounds, words
@@ -335,7 +339,7 @@ class Interval(NamedTuple):
         >>> Interval(0.8, 0.7, 1.2).change(), Interval(4.4, 1.9, 9.0).change()
         ('-20 % [-30, +20]', '4.4 times [1.9, 9]')
         """
-        return self.text(TIMES, " times") if self.is_multiple else self.growth()
+        return self.text(shorter, " times") if self.is_multiple else self.growth()
 
     def growth(self) -> Number:
         """Text of a ratio as a relative change, in percent."""
@@ -364,9 +368,6 @@ def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:
         return MISSING
     places = 1 - int(np.floor(np.log10(both[1]))) if both[1] > 0 else 6
     return Number(" ± ".join(numbers([round(each, places) for each in both], max(places, 0))))
-
-
-TIMES = partial(short, digits=3)
 
 
 def _relative(ratio: SupportsFloat) -> Number:
@@ -398,6 +399,11 @@ def band_verdict(inside: float, level: float) -> str:
     return "far too little" if inside < level - 0.2 else "not what it claims"
 
 
+def with_minus(text: str) -> str:
+    """Text whose negative numbers have the sign of minus."""
+    return re.sub(r"(?<![\w)])-(?=\d)", "−", text)
+
+
 def plain_cell(text: str) -> str:
     """Text that no spreadsheet takes for a formula: an apostrophe stands before it.
 
@@ -406,11 +412,9 @@ def plain_cell(text: str) -> str:
     >>> plain_cell("=1+1"), plain_cell("-0.5"), plain_cell("heave")
     ("'=1+1", '-0.5', 'heave')
     """
-    if not text.startswith(("=", "+", "-", "@", "\t", "\r")):
-        return text
-    if re.match(r"[+-]?(\d|\.\d|inf|nan)", text) and not re.search(r"[=(!|]", text):
-        return text
-    return text if text in ("-", MISSING) else f"'{text}"
+    is_number = re.match(r"-\Z|[+-]?(\d|\.\d|inf|nan)", text) and not re.search(r"[=(!|]", text)
+    begins = text.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{text}" if begins and not is_number else text
 
 
 def write_csv(table: Table, path: Path) -> Path:
@@ -451,7 +455,7 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
     for block in blocks:
         left, each = max(room(block), 0), RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for k in block:
-            more = min(left, max(max(map(len, columns[k])) - least[k], 0))
+            more = min(left, max(map(len, columns[k])) - least[k])
             left -= more
             side: JustifyMethod = "right" if k in table.numbers else "left"
             each.add_column(columns[k][0], justify=side, width=least[k] + more, overflow="fold")
@@ -490,10 +494,9 @@ def latex_text(text: str) -> str:
     >>> latex_text("-0.12 [-0.3, 0.1] a-1")
     '$-$0.12 [$-$0.3, 0.1] a-1'
     """
-    text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
     known = WORDS["latex"]
     signs = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
-    return re.sub(signs, lambda match: known[match[0]], text)
+    return re.sub(signs, lambda match: known[match[0]], with_minus(text))
 
 
 def write_latex(table: Table, path: Path) -> Path:

@@ -21,11 +21,13 @@ from seakeep.arrays import (
     ArrayLike,
     ComplexArray,
     FloatArray,
+    IntArray,
     as_pair,
     as_series,
     number,
     positive,
     time_step,
+    undefined,
 )
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
@@ -133,7 +135,7 @@ def phase_celerity(
     phase = expected + np.angle(np.conj(cross) * np.exp(-1j * expected))
     phase = np.maximum(phase, 1e-9)
     celerity = 2 * np.pi * frequency * apart / phase
-    with np.errstate(divide="ignore"):
+    with undefined():
         error = np.sqrt((1.0 - coherence) * length / (2.0 * first.size * coherence))
     return PhaseCelerity(frequency, celerity, coherence, celerity * error / phase)
 
@@ -508,7 +510,7 @@ class CarriedElevation:
     highest: float
     terms: FloatArray = field(repr=False)
 
-    def at(self, distance: ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
+    def at(self, distance: ArrayLike, sample: int | slice | IntArray = slice(None)) -> FloatArray:
         """Elevation at a distance from where it was measured."""
         half = 0.5 * (self.highest - self.lowest)
         place = np.asarray(distance, float) - 0.5 * (self.highest + self.lowest)

@@ -279,8 +279,8 @@ def compare_models(
             warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
             if (until := float(forecast.attrs.get("reads_input_until", -1.0))) > 0.0:
                 warn(
-                    f"the forecast of {name} reads the waves up to {until:.3g} s after the instant "
-                    "that it forecasts: the model needs these waves ahead of time."
+                    f"the forecast of {name} reads the inputs up to {until:.3g} s after the "
+                    "instant that it forecasts: the model needs them ahead of time."
                 )
     return compared
 

@@ -273,7 +273,7 @@ def _input_map(spec: Any, settings: Any) -> dict[str, Any]:
 def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps: int) -> None:
     """Warn of each respect in which a test lies outside what trained the model."""
     for text in outside_training(model, run, start, steps):
-        warn(f"{name}: {text}. Train in such waves too: errors may be large.")
+        warn(f"{name}: {text}. Train in such conditions too: errors may be large.")
 
 
 def _warn_of_slow_model(model: Model, runs: Datasets) -> None:

@@ -388,7 +388,7 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
     )
 
     def change(level: FloatArray, growth: FloatArray) -> FloatArray:
-        with np.errstate(invalid="ignore"):
+        with undefined():
             return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
@@ -529,7 +529,7 @@ def regular_response(groups: Datasets, test: str) -> xr.Dataset:
     """
     data = groups[f"tests/{test}"]
     squares, answer = _responses(groups, test)
-    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+    with warnings.catch_warnings(), undefined():
         # A constant forecast has no phase, and nothing judged no mean.
         warnings.simplefilter("ignore", RuntimeWarning)
         errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=(2, 3)))

@@ -414,19 +414,17 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
     if training.left_out or len(training.runs) > 1:
         spec: Any = plan.specs[unit.model].from_json(fitted.origin)
         groups = [each.left_out for each in plan.training if each is not training and each.left_out]
-        tests: Groups = {}
-        ensembles: dict[str, Any] = {}
+        cases: dict[str, Any] = {}
         for group in groups or [(run,) for run in training.runs]:
             rest = [span for span in training.spans if span[0] not in group]
-            others = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
-            if rest and others:
-                tests |= others
-                ensembles |= dict.fromkeys(others, spec.fit(*plan.taught(rest)))
+            tests = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
+            if rest and tests:
+                ensemble = spec.fit(*plan.taught(rest))
+                cases |= {name: (ensemble, run) for name, run in tests.items()}
     else:
         spans = [(name, *plan.runs[name].attrs["train_span"]) for name in plan.calibrated_on]
-        tests = parts_of(plan.runs, spans)
-        ensembles = dict.fromkeys(tests, fitted)
-    judged = list(held_out(ensembles, tests, steps, statistics.level).values())
+        cases = {name: (fitted, run) for name, run in parts_of(plan.runs, spans).items()}
+    judged = list(held_out(cases, steps, statistics.level).values())
     nothing = np.full(len(plan.states), np.nan)
     unknown = ConformalMargin(nothing, nothing, nothing, nothing, statistics.level)
     learnt: Any = unknown, nothing, [nothing] * 4

@@ -56,7 +56,9 @@ enum { PLACED = {{ follows.placed | length }}, TAPS = {{ foresight.shape[3] }} }
 /* Waves of training: shares of energy by band, heights and steepnesses. */
 {{ array("shares", coverage.shares) -}}
 {{ array("heights", coverage.heights) -}}
-{{ array("steepnesses", coverage.steepnesses) }}
+{{ array("steepnesses", coverage.steepnesses) -}}
+{{ array("input_centre", signature.input_scale.centre[:Q]) -}}
+{{ array("input_spread", signature.input_scale.spread[:Q]) }}
 static const int elevations[] = { {% for each in coverage.elevations %}{{ 1 if each else 0 }}, {% endfor %}0 };
 #define TRAINED {{ validity.TRAINED | hex }}
 enum { BANDS = {{ coverage.shares.shape[1] }} };
@@ -571,10 +573,12 @@ int {{ name }}_validity({{ name }}_estimator *e)
         double energy[BANDS] = { 0.0 }, total = 0.0, unseen = 0.0, height, steepness, repeats, margin;
         const double *taught = shares + q * BANDS;
         int peak = 0, moves = 0;
-        if (!waves[q])
-            continue;
         for (int t = 0; t < size; t++)
             mean += input(e, t)[q] / size;
+        if (size > 8 * GAP && fabs(mean - input_centre[q]) > {{ validity.FAR | hex }} * input_spread[q] && input_spread[q] > 0.0)
+            outside |= {{ upper }}_MEAN;
+        if (!waves[q])
+            continue;
         for (int t = 0; t < size; t++) {
             double away = pow(input(e, t)[q] - mean, 2.0);
             square += away / size;

@@ -28,11 +28,11 @@ enum {
     {{ upper }}_ESTIMATES = {{ late + (errors | length) + ([s + 1, x_rows, past + z + 1] | max) }}
 };
 
-/* What of the waves, or of the mean surge, lies outside the training; or whether waves were lost that
+/* What of the waves, of the means of inputs or of surge lies outside the training; or whether waves were lost that
  * estimates and forecasts go back to, beyond gaps of up to {{ gap }} samples, which are closed. While
  * nothing at all is measured they are not: forecasts hold what they do. Consistency says that a state
  * jumped of late, and was taken as lost. */
-enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8, {{ upper }}_CONSISTENCY = 16, {{ upper }}_LOST = 32 };
+enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8, {{ upper }}_CONSISTENCY = 16, {{ upper }}_LOST = 32, {{ upper }}_MEAN = 64 };
 
 /* All that an estimator remembers. To save and restore it, copy it as it is. */
 typedef struct {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from seakeep.report.style import (
     figure_style,
     legend_outside,
     panels,
+    plain_text,
     short_label,
     shown_unit,
 )
@@ -30,25 +31,18 @@ SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 POINTS = {"linestyle": "none", "elinewidth": 0.8}
 
 
-@figure_style()
 def by_state(
-    result: xr.Dataset,
-    axes: Places,
-    size: tuple[float, float],
-    draw: Callable[..., None],
-    each: int = 1,
-    most: int = 3,
-) -> Figure:
-    """Draw panels for each state: `draw` takes the results of one, and its Axes, `each` of them."""
+    result: xr.Dataset, axes: Places, size: tuple[float, float], each: int = 1, most: int = 3
+) -> Iterator[tuple[Any, ...]]:
+    """Results of each state in turn, and its Axes; a new figure has its legend after the last."""
     chosen = result["state"].values
     figure, places = panels(axes, each * len(chosen), most, size)
     for number, name in enumerate(chosen):
-        draw(result.sel(state=name), *places[each * number :][:each])
+        yield result.sel(state=name), *places[each * number :][:each]
     if axes is None:
         side = "upper center" if each > 1 else "lower center"
         legend_outside(*places[:each], side=side)
         figure.align_ylabels()
-    return figure
 
 
 def _shown(own: xr.Dataset) -> tuple[float, str, str]:
@@ -63,6 +57,7 @@ def _end(spectrum: xr.DataArray) -> float:
     return float(spectrum["frequency"][np.flatnonzero(energy > 1e-3 * energy.max())[-1]])
 
 
+@figure_style()
 def response(
     result: xr.Dataset, measured: xr.Dataset | None = None, *, axes: Places = None
 ) -> Figure:
@@ -81,8 +76,10 @@ def response(
     -------
     Figure
     """
-
-    def draw(own: xr.Dataset, gain: Any, turn: Any) -> None:
+    entry = "wave" if "wave" in result["input"] else result.attrs["reference"]
+    answering = result.dropna("state", how="all", subset=["amplitude"]).sel(input=entry)
+    most = 2 + 2 * (answering.sizes["state"] % 2 == 0)
+    for own, gain, turn in by_state(answering, axes, (2.9, 1.75), 2, most):
         factor, units, label = _shown(own)
         frequency, trained, phase = (own[k].values for k in ("frequency", "trained", "phase"))
         for place in (gain, turn):
@@ -111,13 +108,10 @@ def response(
         gain.set_ylim(0, 1.25 * factor * inside.max() if inside.size else None)
         gain.set_ylabel(f"{label} [{units}]")
         turn.set(ylabel=f"phase of {label} [°]", ylim=(-190, 190), yticks=range(-180, 181, 90))
-
-    entry = "wave" if "wave" in result["input"] else result.attrs["reference"]
-    answering = result.dropna("state", how="all", subset=["amplitude"]).sel(input=entry)
-    most = 2 + 2 * (answering.sizes["state"] % 2 == 0)
-    return by_state(answering, axes, (2.9, 1.75), draw, 2, most)
+    return gain.figure
 
 
+@figure_style()
 def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the coherence of each state with the inputs, over the state's own spectrum.
 
@@ -134,7 +128,7 @@ def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """
     top = _end(result["spectrum"])
 
-    def draw(own: xr.Dataset, place: Any) -> None:
+    for own, place in by_state(result, axes, (3.0, 1.9)):
         frequency, power = own["frequency"].values, own["spectrum"].values
         light = {"color": PALETTE["light"], "linewidth": 0, "label": "spectrum of the state"}
         place.fill_between(frequency, power / max(power.max(), 1e-300), **light)
@@ -146,8 +140,7 @@ def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
             place.plot(frequency, own["multiple_observables"], **line)
         place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
         place.set_ylabel(f"coherence, {short_label(own['state'].item())} [1]")
-
-    return by_state(result, axes, (3.0, 1.9), draw)
+    return place.figure
 
 
 @figure_style()
@@ -172,7 +165,7 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     words = [
         f"{period:.3g} s, {ratio:.3f}" if np.isfinite(period) else f"decays in {time:.3g} s"
         for period, ratio, time in zip(
-            *(at[key].values for key in ("period", "damping_ratio", "decay_time")), strict=True
+            at["period"], at["damping_ratio"], at["decay_time"], strict=True
         )
     ]
     figure, (place,) = panels(axes, 1, 1, (2.8 + 0.5 * len(states), 0.9 + 0.24 * len(words)))
@@ -189,6 +182,7 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     return figure
 
 
+@figure_style()
 def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw what is left of an offset after its release, motion by motion.
 
@@ -203,8 +197,7 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
     -------
     Figure
     """
-
-    def draw(own: xr.Dataset, place: Any) -> None:
+    for own, place in by_state(result.rename(motion="state"), axes, (3.0, 1.8)):
         left = own["displacement"].values
         place.axhline(0.0, **LINES["zero"])
         place.plot(own["time"], left, **LINES["solid"])
@@ -212,10 +205,10 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
         place.set_xlim(0, float(own["time"][min(moving[-1] + 2, left.size - 1)]))
         place.set_xlabel("time after the release [s]")
         place.set_ylabel(f"{short_label(own['state'].item())} over offset [1]")
+    return place.figure
 
-    return by_state(result.rename(motion="state"), axes, (3.0, 1.8), draw)
 
-
+@figure_style()
 def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw correlations of one-step errors, the spectrum of free runs' errors, and their age.
 
@@ -232,7 +225,7 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """
     end = 1.5 * _end(result["measured_spectrum"])
 
-    def draw(own: xr.Dataset, white: Any, past: Any, spectrum: Any, age: Any) -> None:
+    for own, white, past, spectrum, age in by_state(result, axes, (2.6, 1.75), 4, 4):
         limit = float(own["limit"])
         white.axhspan(-limit, limit, **SHADE)
         white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
@@ -243,7 +236,7 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
             wide = float(own["input_limit"].sel(input=each["input"]))
             past.axhspan(-wide, wide, **SHADE)
             line = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": dash}
-            past.plot(own["lag"], each, **line, label=each["input"].item())
+            past.plot(own["lag"], each, **line, label=plain_text(each["input"].item()))
         past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
         past.set_title("with past inputs")
         frequency, power = own["frequency"][1:], own["measured_spectrum"].values
@@ -261,10 +254,10 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
         if axes is not None:
             for place in (past, spectrum):
                 place.legend(fontsize=6)
+    return white.figure
 
-    return by_state(result, axes, (2.6, 1.75), draw, 4, 4)
 
-
+@figure_style()
 def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw how often peaks exceed a level, measured and forecast, beside Rayleigh and Weibull.
 
@@ -279,8 +272,7 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
     -------
     Figure
     """
-
-    def draw(own: xr.Dataset, place: Any) -> None:
+    for own, place in by_state(result, axes, (3.0, 2.0)):
         factor, unit, label = _shown(own)
         level = np.linspace(0, 1.1 * np.nanmax(own["peak"], initial=0.0) or 1.0, 200)
         scale, shape, width = (
@@ -301,22 +293,20 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
         place.set_xlim(0, factor * level[-1])
         place.set(xlabel=f"peak of {label} [{unit}]", ylabel="exceeded by [1]")
         place.locator_params("x", nbins=5)
+    return place.figure
 
-    return by_state(result, axes, (3.0, 2.0), draw)
 
-
+@figure_style()
 def density(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
-
-    def draw(own: xr.Dataset, place: Any) -> None:
+    for own, place in by_state(result, axes, (3.0, 1.9)):
         factor, unit, label = _shown(own)
         for kind in ("measured", "forecast"):
             height = own["density"].sel(kind=kind) / factor
             place.plot(factor * own["deviation"], height, **LINES[kind], label=kind)
         place.set_ylim(bottom=0)
         place.set(xlabel=f"{label} from its mean [{unit}]", ylabel=f"density [1/{unit}]")
-
-    return by_state(result, axes, (3.0, 1.9), draw)
+    return place.figure
 
 
 @figure_style()
@@ -346,9 +336,8 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
         for kind, at in kinds.items():
             if at[y].notnull().any():
                 place.plot(at[x], at[y], linestyle="none", label=kind, **TESTS[kind])
-        for run, *spot in zip(*(beyond[key].values for key in ("run", x, y)), strict=True):
-            if np.isfinite(spot).all():
-                place.annotate(run, spot, (6, 4), textcoords="offset points", fontsize=7)
+        for run, *spot in beyond[[x, y]].to_dataframe()[[x, y]].dropna().itertuples():
+            place.annotate(run, spot, (6, 4), textcoords="offset points", fontsize=7)
         place.set(xlabel=across, ylabel=up)
         place.margins(x=0.15)
         place.set_ylim(0, 1.2 * float(result[y].max()))
@@ -357,6 +346,7 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
     return figure
 
 
+@figure_style()
 def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw mean drift and slow response per amplitude squared, offsets of regular runs beside.
 
@@ -371,8 +361,8 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
     -------
     Figure
     """
-
-    def draw(own: xr.Dataset, place: Any) -> None:
+    answering = result.dropna("state", how="all", subset=["slow_response"])
+    for own, place in by_state(answering, axes, (3.0, 2.0)):
         factor, unit, label = _shown(own)
         mean, *slow = factor * own["slow_response"]
         place.axhline(0.0, **LINES["zero"])
@@ -387,6 +377,4 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
             offsets = (factor * own[key] for key in ("offset", "offset_uncertainty"))
             place.errorbar(own["point_frequency"], *offsets, **style)
         place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
-
-    answering = result.dropna("state", how="all", subset=["slow_response"])
-    return by_state(answering, axes, (3.0, 2.0), draw)
+    return place.figure

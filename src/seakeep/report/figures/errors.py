@@ -47,11 +47,10 @@ LOWEST = 0.8
 """Modulus at which the axis ends; what lies below dies out within a few samples."""
 
 
-@figure_style()
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
     figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
-    labels = [wrapped(result.label_of(test)) for test in tests]
+    labels = [plain_text(wrapped(result.label_of(test))) for test in tests]
     for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
         columns = {
             model: [average_of(result.errors(test, model, measure)) for test in tests]
@@ -62,7 +61,6 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     return figure
 
 
-@figure_style()
 def channel_boxes(result: StudyResult, test: str) -> Figure:
     """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     figure = new_figure(8.5, 5.6)
@@ -147,7 +145,6 @@ def _draw_boxes(
         axes.set_ylim(bottom=0)
 
 
-@figure_style()
 def error_over_time_figure(result: StudyResult) -> Figure:
     """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles."""
     tests, models = list(result.tests), judged_models(result)
@@ -168,13 +165,13 @@ def error_over_time_figure(result: StudyResult) -> Figure:
             axes.set_title(words)
             axes.legend(fontsize=6.5, loc="upper left")
         row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
-        row[0].set_ylabel(f"{wrapped(result.label_of(test), WIDEST)}\nε [measured SD]")
+        label = plain_text(wrapped(result.label_of(test), WIDEST))
+        row[0].set_ylabel(f"{label}\nε [measured SD]")
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
 
 
-@figure_style()
 def density_figure(result: StudyResult, model: str) -> Figure:
     """Density of each channel, measured and predicted, each with its 95 % band."""
     data = result.groups["statistics/densities"].sel(model=model)
@@ -186,11 +183,10 @@ def density_figure(result: StudyResult, model: str) -> Figure:
     figure, places = panels(None, len(result.channels), 4, (2.125, 1.75))
     for axes, name in zip(places, result.channels, strict=True):
         curves = data.sel(channel=name)
-        x, weight = curves["value"].values, curves["measured_mean"].values
-        centre = np.average(x, weights=weight)
-        spread = np.sqrt(np.average((x - centre) ** 2, weights=weight))
-        z = (x - centre) / spread
-        highest = np.fmax(curves["measured_upper"].values, curves["predicted_upper"].values)
+        weighted = curves["value"].weighted(curves["measured_mean"])
+        spread = weighted.std()
+        z = (curves["value"] - weighted.mean()) / spread
+        highest = np.fmax(curves["measured_upper"], curves["predicted_upper"])
         seen = z[highest > 1e-3 * highest.max()]  # of all models, one may have run away
         axes.set_xlim(seen[0], seen[-1])
         for key, words, tint, dash in sides:
@@ -206,7 +202,6 @@ def density_figure(result: StudyResult, model: str) -> Figure:
     return figure
 
 
-@figure_style()
 def eigenvalue_figure(result: StudyResult) -> Figure:
     """Eigenvalues of each model of the first training set, for an ensemble those of its members."""
     figure = new_figure(8.5, 3.0)
@@ -277,8 +272,7 @@ def error_figure(table: xr.Dataset) -> Figure:
     figure = new_figure(max(4.5, 1.5 + 0.9 * len(labels)), 3.4)
     axes = figure.subplots()
     _draw_points(axes, table, "model", "anrmse", labels)
-    finite = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
-    if finite.size and 0.0 < 10.0 * finite.min() < finite.max():
+    if 0.0 < 10.0 * table["anrmse"].min() < table["anrmse"].max():
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0.0)
@@ -312,9 +306,9 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
         for number, (model, of_model) in enumerate(nowcasts.items()):
             at, style = of_model.sel(run=run, channel=name), SERIES[1 + number % (len(SERIES) - 1)]
             line = {"color": style["color"], "linestyle": style["linestyle"] if number else "-"}
-            axes.plot(at["lead"], at["error"], **line, label=f"{model}: error")
+            axes.plot(at["lead"], at["error"], **line, label=plain_text(f"{model}: error"))
             claimed = {"color": style["color"], "linewidth": 0.7, "alpha": 0.7}
-            axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
+            axes.plot(at["lead"], at["claimed"], **claimed, label=plain_text(f"{model}: claimed"))
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
         axes.set_title(short_label(name))
         axes.set(xlim=(0, first["lead"].max()), xlabel="lead time [s]")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -42,7 +42,7 @@ from seakeep.report.style import (
     shown,
     shown_unit,
 )
-from seakeep.report.tables import band_words
+from seakeep.report.tables import band_words, entries
 from seakeep.signals.time_axis import over_gaps
 from seakeep.study import Comparison, StudyResult, comparison_table
 from seakeep.study.comparison import wave_period
@@ -334,7 +334,6 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     return cells
 
 
-@figure_style()
 def history_figure(
     result: StudyResult, test: str, training: int, window: int, names: Sequence[str] | None = None
 ) -> Figure:
@@ -392,7 +391,6 @@ def _standard(at: xr.Dataset, values: Any) -> Any:
     return (np.asarray(values) - float(at["training_mean"])) / float(at["training_std"])
 
 
-@figure_style()
 def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
     """Channels as measured (columns) in one window of irregular waves, act by act (rows)."""
     acts = [act for act in ACTS if act.name in results and not act.without_drift]
@@ -416,9 +414,11 @@ DRAWN = 50
 """Channels that a picture shows at most, each in a row of its own; the table lists all."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-WELCH = {"paper": (COLOURS["forecast"], DASHED), "recommended": (COLOURS["ensemble"], "-")}
-"""Colour and dash of a measured spectrum, by how it is estimated."""
-Spectrum = tuple[FloatArray, FloatArray]
+WELCH = {
+    "paper": ("8.2 s (paper)", COLOURS["forecast"], DASHED),
+    "recommended": ("60 s", COLOURS["ensemble"], "-"),
+}
+"""Segments, colour and dash of a measured spectrum, by how it is estimated."""
 
 
 @figure_style()
@@ -475,57 +475,37 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     return figure
 
 
-@figure_style()
 def spectrum_figure(result: StudyResult) -> Figure:
     """Mean spectrum of the irregular runs of a study, and the frequencies of the regular ones."""
     spectra, runs = result.groups["spectra"], result.groups["runs"]
-    every = runs["run"].values
-    # Where no run is irregular the mean over all of them is drawn.
-    irregular = every[runs["waves"].values != "regular"]
-    names = irregular if irregular.size else every
-
-    def curves(kind: str, of: Iterable[str]) -> list[Spectrum]:
-        """Frequency and density of runs, without the bins beyond their own."""
-        chosen = [spectra.sel(run=run, kind=kind).dropna("bin", subset=["density"]) for run in of]
-        return [(at["frequency"].values, at["density"].values) for at in chosen if at["bin"].size]
-
-    lengths = {"paper": "8.2 s (paper)", "recommended": "60 s"}
-    measured = {
-        kind: (f"measured, segments of {length}", curves(kind, names))
-        for kind, length in lengths.items()
-    }
-    known = result.groups.get("nominal", xr.Dataset())
-    nominal = [
-        (str(each.attrs.get("long_name", name)), (known["frequency"].values, each.values))
-        for name, each in known.data_vars.items()
-    ]
     figure = new_figure(8.5, 4.2)
     axes = figure.subplots()
-    draw_spectra(axes, nominal, measured, runs["wave_frequency"].values)
-    peaks = [f[np.argmax(density)] for f, density in curves("recommended", every)]
-    axes.set_xlim(0, 2.2 * max(peaks, default=1.0))
+    known = result.groups.get("nominal", xr.Dataset())
+    for each, dash in zip(known.data_vars.values(), ("-", ":"), strict=False):
+        line = {"color": COLOURS["measured"], "linestyle": dash}
+        axes.plot(known["frequency"], each, label=each.attrs["long_name"], **line)
+    # Where no run is irregular the mean over all of them is drawn.
+    drawn = runs["run"][runs["waves"] != "regular"]
+    of_drawn = spectra.sel(run=drawn if drawn.size else runs["run"])
+    for kind, (length, colour, dash) in WELCH.items():
+        records = entries(of_drawn.sel(kind=kind), "run")
+        of_runs = [at.dropna("bin", subset=["density"]) for at in records]
+        curves = [(at["frequency"], at["density"]) for at in of_runs if at["bin"].size]
+        if curves:  # at the frequencies of the first: records differ in length
+            f, _ = curves[0]
+            mean = np.mean([np.interp(f, *curve) for curve in curves], axis=0)
+            words = f"measured, segments of {length}"
+            axes.plot(f, mean, label=words, color=colour, linestyle=dash)
+    regular = np.unique(runs["wave_frequency"].dropna("run").round(3))
+    for number, frequency in enumerate(regular):
+        style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
+        axes.axvline(frequency, **style, label=None if number else "regular waves")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8)
+    long = spectra.sel(kind="recommended")
+    peaks = long["frequency"].where(long["density"] == long["density"].max("bin"))
+    axes.set_xlim(0, 2.2 * float(peaks.max().fillna(1.0)))
+    axes.set_ylim(bottom=0)
     channel = plain_text(result.words_of(spectra.attrs["channel"]))
     axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {channel} [m²/Hz]")
     return figure
-
-
-def draw_spectra(
-    axes: Any,
-    nominal: Sequence[tuple[str, Spectrum]],
-    measured: Mapping[str, tuple[str, Sequence[Spectrum]]],
-    regular: FloatArray,
-) -> None:
-    """Draw nominal spectra, the mean of measured ones, and the frequencies of regular waves."""
-    for (label, curve), dash in zip(nominal, ("-", ":") * len(nominal), strict=False):
-        axes.plot(*curve, label=label, color=COLOURS["measured"], linestyle=dash)
-    for kind, (label, curves) in measured.items():
-        if curves:  # at the frequencies of the first: records differ in length
-            f, (colour, dash) = curves[0][0], WELCH[kind]
-            mean = np.mean([np.interp(f, *each) for each in curves], axis=0)
-            axes.plot(f, mean, label=label, color=colour, linestyle=dash)
-    for number, frequency in enumerate(np.unique(regular[np.isfinite(regular)].round(3))):
-        style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
-        axes.axvline(frequency, **style, label=None if number else "regular waves")
-    axes.set_ylim(bottom=0)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8)

@@ -7,7 +7,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from seakeep.models.selection import UNHELD
 from seakeep.report.figures.histories import spectrum_figure
@@ -44,10 +43,11 @@ def wave_tables(result: StudyResult) -> list[Table]:
         for name, channel in run.data_vars.items()
         if "x_position" in channel.attrs
     ]
-    frame = channels.attrs.get("frame", "")
-    spectra = result.groups.get("spectra", xr.Dataset())
+    positions = table("positions", places, frame=channels.attrs.get("frame", ""))
+    if (spectra := result.groups.get("spectra")) is None:
+        return [positions]
     rows = []
-    for at in entries(result.groups["runs"], "run") if spectra else ():
+    for at in entries(result.groups["runs"], "run"):
         (name,), sea = row(at, "run"), at["sea_state"].item() or at["waves"].item()
         frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
         known = np.isfinite(frequency + depth)
@@ -62,7 +62,7 @@ def wave_tables(result: StudyResult) -> list[Table]:
         )
         facts = (height, number(frequency), number(speed / frequency, 2), number(speed, 2))
         rows.append((name, sea, *facts, spans or "test"))
-    return [table("waves", rows, **spectra.attrs), table("positions", places, frame=frame)]
+    return [table("waves", rows, **spectra.attrs), positions]
 
 
 def data(result: StudyResult) -> Section:
@@ -70,8 +70,8 @@ def data(result: StudyResult) -> Section:
     channels = result.groups["channels"]
     signs, runs, clocks = [], [], []
     for at in entries(channels, "name"):
-        name, use, unit, *others = row(at, "name", "use", "units", "positive", "source")
-        signs.append((result.words_of(name), use, shown_unit(unit), *others))
+        words, use, unit, *others = row(at, "long_name", "use", "units", "positive", "source")
+        signs.append((words, use, shown_unit(unit), *others))
     for name, run in result.prepared.items():
         _, span, count, kinds = run_row(name, run)
         sea = row(result.groups["runs"].sel(run=name), "sea_state")
@@ -104,7 +104,7 @@ def settings(result: StudyResult) -> Section:
     ]
     statistics = {**result.settings["statistics"], "calibrate": result.is_calibrated}
     every = result.settings | {"statistics": statistics, "models": None}
-    stated = [(key, setting_text(key, value)) for key, value in _leaves("", every)]
+    stated = [(key, setting_text(key, value)) for key, value in _leaves(every)]
     windows, training = [], result.groups["training"]
     for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):
         words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
@@ -127,12 +127,12 @@ def settings(result: StudyResult) -> Section:
     )
 
 
-def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _leaves(f"{prefix}.{key}" if prefix else key, inner)
-    elif value not in (None, "", []):
-        yield prefix, value
+def _leaves(tables: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{prefix}{key}.")
+        elif value not in (None, "", []):
+            yield f"{prefix}{key}", value
 
 
 def setting_text(key: str, value: Any) -> str:
@@ -163,8 +163,7 @@ def _prior_text(prior: dict[str, Any], unit: str) -> str:
     lengths = {"T": " T̂", "s": " s"}
     for kind, words in (("uniform", "uniform, "), ("log_uniform", "log-uniform, "), ("fixed", "")):
         if kind in prior:
-            given = prior[kind] if isinstance(prior[kind], list) else [prior[kind]]
-            texts = [str(each).partition(" ") for each in given]
+            texts = [str(each).partition(" ") for each in np.atleast_1d(prior[kind])]
             bounds = " to ".join(f"{float(each[0]):.6g}" for each in texts)
             return words + bounds + lengths.get(texts[0][2], unit)
     if "distribution" in prior:
@@ -218,10 +217,10 @@ def whole_readers(result: StudyResult) -> list[str]:
 
 def unequal_training(result: StudyResult) -> str:
     """Sentence on models that learn from different lengths of data; empty where none do."""
-    period, words = result.encounter_period, {}
-    sets = [sum(end - begin for _, begin, end in spans) for spans in training_spans(result)]
+    period, training, words = result.encounter_period, result.groups["training"], {}
+    sets = (training["end"] - training["begin"]).sum("of_run")
     for model, length in _trained_on(result).items():
-        words[model] = f"from all of a training set ({reach(np.divide(sets, period))} T̂)"
+        words[model] = f"from all of a training set ({reach(sets / period)} T̂)"
         if isinstance(length, dict):
             words[model] = f"from a part ({_prior_text(length, ' samples')})"
         elif length is not None:
@@ -268,8 +267,7 @@ def grouped(words: Mapping[str, str]) -> list[str]:
 
 def training_overlap(result: StudyResult) -> tuple[bool, str]:
     """Whether training windows share a part that counts, and a sentence on it."""
-    training = result.groups["training"]
-    if result.settings["training"]["scheme"] != "halves" or "stop" not in training:
+    if result.settings["training"]["scheme"] != "halves":
         return False, ""
     period, length = result.encounter_period, result.attrs["longest_training"]
     spans = [span for (span,) in training_spans(result)]

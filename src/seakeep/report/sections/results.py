@@ -46,6 +46,7 @@ from seakeep.report.tables import (
     reach,
     row,
     short,
+    shorter,
     signed,
     small_number,
     table,
@@ -63,7 +64,7 @@ def summary(result: StudyResult) -> Section:
         result.attrs.get("preparation_note"),
         words_of_lost(lost) if lost else "",
         words_of_repeats(repeats) if repeats else "",
-        words if shares else "",
+        words * shares,
         test_overlap(result),
     ]
     name = "heave" if "heave" in result.channels else result.channels[0]
@@ -172,12 +173,10 @@ def difference_table(result: StudyResult, test: str) -> Table:
     for model in others:
         pairs = [ratio_of(at.sel(model=model, measure=key)).cells() for key in HEADING]
         rows.append((model_words(model), *chain(*pairs)))
-    heads = [f"{key}: {part}" for key in HEADING.values() for part in ("change", "95 %", "verdict")]
     return table(
         "differences",
         rows,
         conditional(result, result.models),
-        columns=("model", *heads),
         name=f"differences_{test}",
         test=result.label_of(test),
         first=model_words(first),
@@ -312,7 +311,7 @@ def plain_symbol(channel: str) -> str:
     known = canonical_channel(channel)
     if known is None:
         return channel.replace("_", " ")
-    text = re.sub(r"\\mathrm\{([^}]*)\}|\\mathrm ?(\w+)", r"\1\2", known.symbol)
+    text = re.sub(r"\\mathrm\{([^}]*)\}", r"\1", known.symbol)
     greek = r"\\(theta|phi|psi|eta)"
     text = re.sub(greek, lambda m: unicodedata.lookup(f"GREEK SMALL LETTER {m[1]}"), text)
     return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
@@ -320,8 +319,8 @@ def plain_symbol(channel: str) -> str:
 
 def glossary(result: StudyResult) -> Section:
     """Return terms and symbols with what they mean."""
-    symbols = {name: (plain_symbol(name), result.words_of(name)) for name in result.channels}
-    explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols.values())
+    symbols = ((plain_symbol(name), result.words_of(name)) for name in result.channels)
+    explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols)
     regular = "statistics/response" in result.groups
     same = (
         " It is that of the irregular sea and counts lengths in regular waves too: 5 T̂ may hold "
@@ -329,11 +328,10 @@ def glossary(result: StudyResult) -> Section:
     )
     if any(name.startswith("mooring_") for name in result.channels):
         explained += ". M is a mooring load, a force in N."
-    period, same = result.encounter_period, same * regular
-    slap = any("truth" in data for data in result.tests.values())
-    known = {"λ/L": regular, "slap": slap}
+    given = {"period": result.encounter_period, "same": same * regular, "symbols": explained}
+    known = {"λ/L": regular, "slap": any("truth" in data for data in result.tests.values())}
     terms = [
-        (term, meaning.format(period=period, same=same, symbols=explained))
+        (term, meaning.format(**given))
         for term, meaning in WORDS["terms"].items()
         if known.get(term, True)
     ]
@@ -428,9 +426,9 @@ def regular(result: StudyResult) -> Section:
     for of_model in entries(judged, "channel", "model"):
         cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
-            offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
-            total = np.sum(np.square([offset, *others]))
-            share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
+            squares = [float(at[f"error_{key}"]) ** 2 for key in ("offset", "wave", "rest")]
+            total = sum(squares)
+            share = Number(f"{percent(squares[0] / total)} %") if total > 0 else MISSING
             cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
         rows.append(tuple(cells))
     runs = dict.fromkeys(run for test in tests for run in result.tests[test]["run"].values)
@@ -451,41 +449,36 @@ def regular(result: StudyResult) -> Section:
 
 def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
-    groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
-    units, three = result.groups["channels"]["units"], partial(short, digits=3)
+    if (groups := result.groups.get("statistics/bands")) is None:
+        return section("bands")
+    units, tables = result.groups["channels"]["units"], []
     level = short(100 * result.level)
-    for at in entries(groups.sel(model=result.ensembles), "model", "band") if groups else ():
+    for at in entries(groups.sel(model=result.ensembles), "model", "band"):
         at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
         model, band = row(at, "model", "band")
         kind = "calibrated " * (band == "calibrated")
         title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
-        name = f"bands_{band}_{model}"
         more = (infinite_bands(result, model) if kind else "") + conditional(result, [model])
-        of_parts = []
+        of_parts, of_channels = [], []
         scale = at["relative_width"] / at["width"]  # one over the measured SD
         for one in entries(at.assign(at[["winkler", "crps"]] * scale), "test", "part"):
-            inside = one["inside"]
-            if inside.isnull().all():
-                continue
-            least = inside[np.nanargmin(inside.values)]
-            named = result.words_of(least["channel"].item())
-            cells = row(one.mean("channel"), relative_width=2, winkler=2, crps=2)
-            covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
-            of_parts.append(
-                (result.label_of(*row(one, "test")), *row(one, "part"), *covered, *cells)
-            )
-        of_channels = [
-            (
-                result.label_of(test),
-                f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
-                *row(one, inside=2, relative_width=2, winkler=three, crps=three),
-            )
-            for one in entries(at.sel(part="all"), "test", "channel")
-            for test, channel in [row(one, "test", "channel")]
-        ]
-        tables.append(table("bands", of_parts, more, name=name, band=title))
-        name = f"{name}_channels"
-        tables.append(table("bands_by_channel", of_channels, more, name=name, band=title))
+            test, part = row(one, "test", "part")
+            if one["inside"].notnull().any():
+                least = one["inside"][np.nanargmin(one["inside"].values)]
+                named = f"{number(least, 2)} ({result.words_of(least['channel'].item())})"
+                average = one.mean("channel")
+                held, *scores = row(average, inside=2, relative_width=2, winkler=2, crps=2)
+                of_parts.append((result.label_of(test), part, held, named, *scores))
+        for one in entries(at.sel(part="all"), "test", "channel"):
+            test, channel = row(one, "test", "channel")
+            named = f"{result.words_of(channel)} [{units.sel(name=channel).item()}]"
+            cells = row(one, inside=2, relative_width=2, winkler=shorter, crps=shorter)
+            of_channels.append((result.label_of(test), named, *cells))
+        for key, rows, name in (
+            ("bands", of_parts, f"bands_{band}_{model}"),
+            ("bands_by_channel", of_channels, f"bands_{band}_{model}_channels"),
+        ):
+            tables.append(table(key, rows, more, name=name, band=title))
     return section("bands", *tables)
 
 
@@ -533,7 +526,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
         widths = numbers(at["relative_width"].sel(against="measured"), 2)
         columns.append([f"{label}: width [SD]", *widths])
     level = result.level
-    more = _calibrated_words(result, model, level) if calibrated else ""
+    more = _calibrated_words(result, model) if calibrated else ""
     if true:
         more += (
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
@@ -553,7 +546,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     )
 
 
-def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
+def _calibrated_words(result: StudyResult, model: str) -> str:
     """How the calibrated band is made, what it rests on, and where it is of no use."""
     group = result.groups["calibration"].sel(ensemble=model)
     words = "these quantiles, moved outwards by a margin found"
@@ -581,7 +574,7 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
             f"A training set had {reach(group['windows'])} of them; allowing for their dependence, "
             f"their scores are worth {reach(group['blocks'])} independent ones. "
         )
-        if (warranted := float(group["warranted"].min())) < level:
+        if (warranted := float(group["warranted"].min())) < result.level:
             said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
     said += "The margin guarantees nothing in another kind of sea."
     return said + infinite_bands(result, model)
@@ -609,10 +602,9 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant, channel=result.channels)
-    average = at.mean("channel", skipna=False)
     quantiles = {"mean": "EV", "lower": "q0.025", "upper": "q0.975", "uncertainty": "U"}
     own = [
-        [head, *map(small_number, at[key]), small_number(average[key])]
+        [head, *map(small_number, at[key]), small_number(at[key].mean(skipna=False))]
         for key, head in (*quantiles.items(), ("noise_floor", "noise floor"))
     ]
     own.append(["block (samples)", *numbers(at["block_length"], 0), ""])
