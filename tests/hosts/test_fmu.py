@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import zipfile
 
 import numpy as np
 import pytest
@@ -136,15 +135,6 @@ def test_any_name_of_a_channel_is_sound(wave, make_run, channels, tmp_path, monk
     fmu = write_fmu(model, tmp_path / "rom.fmu")
     assert validate_fmu(str(fmu)) == []
     assert fmpy.read_model_description(fmu).modelVariables[0].unit == "<m> 'µ'"
-
-
-def test_without_a_compiler_the_sources_are_there_alone(cases, tmp_path, monkeypatch):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.delenv("CC", raising=False)
-    with zipfile.ZipFile(write_fmu(cases["arx"].model, tmp_path / "arx.fmu")) as archive:
-        names = archive.namelist()
-    listed = ["modelDescription.xml", "sources/arx.h", "sources/arx.c", "sources/fmi2.c"]
-    assert names == listed
 
 
 def test_a_compiler_that_fails_is_quoted(cases, tmp_path, monkeypatch):
