@@ -194,10 +194,6 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message
 
 
-def test_a_free_name_with_a_step_knows_its_unit(changed):
-    assert changed(("[derived.pitch_rate]", "[derived.slope]"))
-
-
 def test_a_derived_rate_of_an_elevation(changed):
     """It was refused: m/s against m."""
     rate = '[derived.eta_fwd_rate]\nfrom = "eta_fwd"\nstep = "differentiate"\n[runs.first]'

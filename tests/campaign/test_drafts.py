@@ -185,18 +185,14 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
         columns[name] = np.where(np.arange(1001) // lost == 3, np.nan, columns[name])
     text, campaign = drafted_of(tmp_path, columns)
     assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
+    assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
+    assert text.count("NOT RECOGNISED") == 1
     if lost == 200:
         assert "# column 'Heave [mm]' left out: has gaps in run.csv" in text
         return
     for name, key in (("heave", "states"), ("eta_2", "inputs")):
         said = f"# {name} left out: it has gaps, and a model takes none. To be among the {key}, "
         assert said in text
-
-
-def test_columns_without_a_known_name_are_marked(tmp_path):
-    text, _ = drafted_of(tmp_path, tank_columns(0, 60.0))
-    assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
-    assert text.count("NOT RECOGNISED") == 1
 
 
 def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
