@@ -5,6 +5,7 @@ import pytest
 from records import record
 from seas import sea
 
+from seakeep.quality import findings_of, judge_runs
 from seakeep.quality.runs import odd_probes
 
 T = np.arange(0, 160, 0.1)
@@ -57,3 +58,12 @@ def test_still_water_says_nothing():
     runs = campaign(high=0.001)
     runs["high"].attrs["waves"] = "still"
     assert list(odd_probes(runs)) == []
+
+
+def test_findings_are_taken_back_once_the_file_is_repaired():
+    runs = campaign(high=0.001)
+    with pytest.warns(match=r"^high: eta_mid moves .* beside eta_fwd as in most other runs\."):
+        judge_runs(runs)
+    runs["high"]["eta_fwd"] *= 1000.0
+    assert judge_runs(runs) == ["high"]
+    assert findings_of(runs["high"]) == []
