@@ -87,7 +87,8 @@ def test_a_sound_series_is_left_alone(noisy):
     assert not find_outliers(noise).any()
     # The share of n samples of white noise scatters by 1/√n.
     assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
-    assert reported(noisy + 0.7 * noisy.std() * np.linspace(0, 1, 3000)) == {"DRIFT"}
+    for size, kinds in ((0.4, set()), (0.7, {"DRIFT"})):  # a drift of less does no harm
+        assert reported(noisy + size * noisy.std() * np.linspace(0, 1, 3000)) == kinds
 
 
 def test_a_probe_that_dies_has_no_drift_besides():
