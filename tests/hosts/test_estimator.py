@@ -2,6 +2,7 @@
 
 import ctypes
 import subprocess
+from dataclasses import replace
 
 import compiled
 import numpy as np
@@ -12,6 +13,7 @@ from records import table
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
+from seakeep.models.growth import LeadErrors
 from seakeep.models.live import Live
 from seakeep.models.validity import Validity
 from seakeep.signals.prediction import foresee
@@ -112,6 +114,29 @@ def measured(run, model, lost_inputs=True):
         u[[30, 160, 161, 162], 1:] = np.nan
         u[[*range(268, 280), *range(302, 310), *range(315, 320)]] = np.nan
     return u, y
+
+
+@pytest.mark.usefixtures("errors_of_training")
+@pytest.mark.parametrize("side", [-9.0, 9.0])
+def test_far_from_the_mean_of_training_a_forecast_lasts_as_in_the_live_model(
+    model, make_run, tmp_path, side
+):
+    scale = model.state_scale
+    doubted = replace(model, selection="a copy, whose errors are its own")
+    rms = np.full((9, 2), 1.5) * scale.spread  # above those of the mean in seas of training
+    vars(doubted)["errors"] = LeadErrors(model.errors.residual, rms)
+    live, found = doubted.live(), Estimator(built(doubted, tmp_path), "rom")
+    every = make_run(100, 5).to_dataframe()
+    u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
+    y[:, 0] += side * scale.spread[0]
+    for at in range(100):
+        assert_allclose(*found.beside(live, u[at], y[at]), rtol=0, atol=1e-9)
+    forecast = found.forecast(60)[1][0]
+    assert_allclose(forecast, moments(live.forecast(60), STATES)[0], rtol=1e-9, atol=1e-9)
+    far = (forecast - scale.centre) / scale.spread
+    assert abs(far[3, 0]) > 3.0
+    assert_allclose(far[-1], 0.0, atol=1e-12)
+    assert_allclose(far[1:, 1], 0.0, atol=1e-12)  # the first step is driven by waves as measured
 
 
 @pytest.mark.usefixtures("errors_of_training")

@@ -166,7 +166,7 @@ def test_no_lead_errs_more_than_the_mean(drifts, drift, spec, positions):
 def test_where_waves_are_known_nothing_is_weighed(model):
     scale, runs = model.state_scale, 9.0 * np.random.default_rng(0).standard_normal((1, 5, 4, 2))
     known = np.array([True, True, False, False])
-    mean, _, weight = weighed(runs, 0.0, scale, known)
+    mean, _, weight = weighed(runs, 0.0, scale, known, np.zeros(2))
     assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
     assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
 
@@ -191,6 +191,17 @@ def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     assert_allclose(parts[0, 0, 0, :, 0], expected)
 
 
+@pytest.mark.parametrize(("history", "expected"), [(-1.0, 0.0), (-3.0, -3.0)])
+def test_a_sea_that_departs_from_training_is_forecast_on(history, expected):
+    one, zero = np.ones(1), np.zeros(1)
+    scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 1.2))
+    before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
+    windows = Windows((), 9, (), before, nothing, nothing, predicted=(0,))
+    parts = np.full((3, 1, 1, 9, 1), -3.0)
+    weigh_members(windows, parts, errors, scale)
+    assert_allclose(parts[0, 0, 0, :, 0], expected)
+
+
 def test_errors_of_several_models_are_known_as_far_as_those_of_any():
     parts = [
         LeadErrors(n * np.eye(1), np.array(x)[:, None]) for n, x in ((1, [3.0]), (3, [1, 1, 4.0]))
@@ -203,8 +214,14 @@ def test_errors_of_several_models_are_known_as_far_as_those_of_any():
 def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
     scale = model.state_scale
     claimed = np.array([0.4, 0.6, 0.8, 0.7, 1.0])[:, None]  # squares over those of training
-    weight = weighed(np.zeros((1, 1, 5, 2)), claimed * scale.spread**2, scale, np.zeros(5, bool))[2]
+    errors, unknown = claimed * scale.spread**2, np.zeros(5, bool)
+    weight = weighed(np.zeros((1, 1, 5, 2)), errors, scale, unknown, np.zeros(2))[2]
     assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
+    # The mean errs more where measured states and the forecast lie far from it, not one alone.
+    for forecast, before, expected in ((3.0, 2.0, 4.0), (-2.0, 3.0, 4.0), (0.5, 3.0, 1.0)):
+        runs = np.full((1, 1, 5, 2), scale.centre + forecast * scale.spread)
+        weight = weighed(runs, expected * errors, scale, unknown, before * scale.spread)[2]
+        assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
 
 
 def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):

@@ -253,8 +253,12 @@ def weighed(
     errors: FloatArray | float,
     scale: Scale,
     given: BoolArray,
+    before: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean of runs that passes over to that of training as the claimed error nears the SD there.
+
+    Where a state lies farther than the SD to one side of that mean all through the history, as the
+    mean surge of another sea does, the mean errs by more: by what the forecast departs, too.
 
     Parameters
     ----------
@@ -270,6 +274,8 @@ def weighed(
         Moments of training.
     given : ndarray of bool, shape (…, steps)
         Whether the waves that a step reads are known: nothing changes there.
+    before : ndarray, shape (N,)
+        The :func:`departure` of the history.
 
     Returns
     -------
@@ -287,14 +293,21 @@ def weighed(
     if len(middle) > 1:
         spread += middle.var(axis=0, ddof=1)
     low, high = DOUBTED
+    known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre
     # A state that never moved is as it is.
-    claimed = (spread + errors) / np.maximum(scale.spread**2, TINY)
+    usual = np.fmax(np.fmin(np.abs(mean - centre), before), scale.spread)
+    claimed = (spread + errors) / np.maximum(usual**2, TINY)
     # Where a departure is lost, nothing of the forecast is trusted.
     trust = np.nan_to_num((high - claimed) / (high - low), nan=0.0)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
-    known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre
     shrunk = centre + lasting * (mean + away - centre)
     return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
+
+
+def departure(history: FloatArray, scale: Scale) -> FloatArray:
+    """How far all of a history lies to one side of the mean of training, shape (N,)."""
+    away = history - scale.centre
+    return np.maximum(away.min(axis=0), -away.max(axis=0))
 
 
 def weigh_members(
@@ -318,11 +331,11 @@ def weigh_members(
     for number, first in enumerate(windows.predicted):
         whole = np.isfinite(parts[0][:, number]).all(axis=(1, 2))
         whole |= not whole.any()
-        own = scale
+        own, before = scale, departure(windows.histories[number], scale)
         if windows.zero is not None:
             own = replace(scale, centre=scale.centre + windows.zero[number])
         for column in range(squares.shape[1] if first >= 0 else 0):  # one by one, for memory
             at = slice(column, column + 1)
             runs = np.stack([each[whole, number, :, at] for each in parts], axis=1)
-            mean, *_ = weighed(runs, squares[:, at], own.part(at), steps < first)
+            mean, *_ = weighed(runs, squares[:, at], own.part(at), steps < first, before[at])
             parts[0][:, number, :, at] += mean - runs[:, 0].mean(axis=0)

@@ -43,7 +43,7 @@ from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.forecasts import label_channels, rows_by_name, statistic_coordinate
-from seakeep.models.growth import WINDOWS, LeadErrors, weighed
+from seakeep.models.growth import WINDOWS, LeadErrors, departure, weighed
 from seakeep.models.inputs import Drive, Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.validity import Conditions, Coverage, Validity
@@ -801,7 +801,8 @@ class Live:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
             given = np.arange(count) <= known - self._ahead
-            table[0], spread, weight = weighed(complete, errors, scale, given)
+            before = departure(history, scale)
+            table[0], spread, weight = weighed(complete, errors, scale, given, before)
             if unseen > leads:
                 table[0], weight = scale.centre, np.zeros_like(weight)
             # The error passes over with the mean, to that of the mean of training.

@@ -724,7 +724,8 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
                   int too_long, double *x, double *std)
 {
     double u[Q + 1], apart[Q + 1] = { 0.0 }, row[Q + 1], moved[N] = { 0.0 }, spreads[N] = { 0.0 };
-    double weight[N], *reach = e->cross;
+    const double *history = e->x + (X_ROWS - back - {{ upper }}_X_ROWS) * N;
+    double weight[N], above[N], below[N], *reach = e->cross;
     int runs = known < n - 1 + {{ lead_samples }} ? RUNS : 1;
     if (runs > 1) {
         expect(e, FORE);
@@ -748,8 +749,13 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
         int from = PAST + back + 1 - dark;
         for (int to = from > 0 ? from : 0; to < {{ upper }}_U_ROWS; to++)
             depart(e->first + to * Q, e->first_apart + to * Q, run, e->u_history + to * Q);
-        if ({{ name }}_start(&e->models[run], e->x + (X_ROWS - back - {{ upper }}_X_ROWS) * N, e->u_history))
+        if ({{ name }}_start(&e->models[run], history, e->u_history))
             return 1;
+    }
+    for (int k = 0; k < {{ upper }}_X_ROWS * N; k++) {
+        double away = history[k] - centre[k % N];
+        above[k % N] = k < N ? away : fmin(above[k % N], away);
+        below[k % N] = k < N ? -away : fmin(below[k % N], -away);
     }
     memcpy(reach, on_states, sizeof on_states);
     for (int i = 0; i < N; i++)
@@ -767,6 +773,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
         }
         for (int i = 0; i < N; i++) {
             double middle = e->models[0].x[i], away = 0.0, variance;
+            double usual = fmax(fmin(fabs(middle - centre[i]), fmax(above[i], below[i])), spread[i]);
             for (int run = 1; run < runs; run += 2) {
                 double more = e->models[run].x[i], less = e->models[run + 1].x[i];
                 moved[i] += 0.5 * (more + less) - middle;
@@ -779,7 +786,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
             if (e->partly)
                 variance = fmin(variance, own[i] * own[i] + carried_error(e, reach + i * M));
             variance += spreads[i];
-            weight[i] = fmin(weight[i], fmax(({{ doubted[1] | hex }} - variance / (spread[i] * spread[i]))
+            weight[i] = fmin(weight[i], fmax(({{ doubted[1] | hex }} - variance / (usual * usual))
                                              / {{ (doubted[1] - doubted[0]) | hex }}, 0.0));
             x[step * N + i] = middle + moved[i];
             if (runs > 1 && step > known - {{ lead_samples }}) {
