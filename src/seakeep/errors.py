@@ -18,6 +18,7 @@ __all__ = [
     "SeakeepError",
     "SeakeepWarning",
     "did_you_mean",
+    "quiet",
     "wanted",
     "warn",
 ]
@@ -71,6 +72,14 @@ def naming(place: str) -> Iterator[None]:
         yield
     except SeakeepError as error:
         raise type(error)(f"{place}: {error}") from None
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Give no SeakeepWarning of what is done within."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)
+        yield
 
 
 def warn(message: str) -> None:

@@ -7,7 +7,6 @@ import functools
 import hashlib
 import io
 import json
-import os
 import re
 import secrets
 import shutil
@@ -32,8 +31,8 @@ FORMAT = 11
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
 SEAL = b"seakeep CRC-32 "
-"""Marker between the content of a NetCDF file and its checksum; HDF5 reads no further. A SHA-256,
-which sealed files before format 9, takes half of the time of reading a large result."""
+"""Marker between the content of a NetCDF file and its checksum; HDF5 reads no further. A SHA-256
+would take half of the time of reading a large result."""
 
 NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 CONTENTS = "seakeep_contents"
@@ -41,28 +40,6 @@ CONTENTS = "seakeep_contents"
 to find them."""
 SHOWN = 5
 """Names of a folder that a message lists at most."""
-
-
-def existing_file(path: Path | str) -> Path:
-    """Path of a regular file that exists; ``~`` is replaced by the home folder.
-
-    Parameters
-    ----------
-    path : Path or str
-        What the user named.
-
-    Returns
-    -------
-    Path
-        The path.
-
-    Raises
-    ------
-    MissingFileError
-        As :func:`reading`.
-    """
-    with reading(path) as place:
-        return place
 
 
 def is_there(path: Path) -> bool:
@@ -356,10 +333,6 @@ def _seal_of(content: memoryview) -> bytes:
     return SEAL + b"%08x" % zlib.crc32(content)
 
 
-def _seal_before(content: memoryview) -> bytes:
-    return b"seakeep SHA-256 " + hashlib.sha256(content).hexdigest().encode()
-
-
 def read_sealed(path: Path | str) -> io.BytesIO:
     """Content of a file of :func:`write_netcdf`, once its checksum was compared.
 
@@ -384,15 +357,16 @@ def read_sealed(path: Path | str) -> io.BytesIO:
         If its checksum is missing or another one.
     """
     file = read_bytes(path)
-    at = max(file.rfind(b"seakeep ", -len(_seal_before(memoryview(b"")))), 0)
-    content, stated = memoryview(file)[:at], file[at:]
+    size = len(SEAL) + 8
+    content, stated = memoryview(file)[:-size], file[-size:]
     if file and not file.startswith((b"\x89HDF", b"CDF")):
         raise DataError(
             f"{path} is no NetCDF file, as seakeep writes. Name one that it wrote, such as "
             "model.nc of seakeep fit; runs are described by a campaign file."
         )
-    if stated not in (_seal_of(content), *([] if SEAL in stated else [_seal_before(content)])):
-        why = "its checksum is another one" if at else "it has no checksum at its end"
+    if stated != _seal_of(content):
+        sealed = stated.startswith(SEAL)
+        why = "its checksum is another one" if sealed else "it has no checksum at its end"
         raise DataError(
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
@@ -534,8 +508,7 @@ def check_output(
         The file wanted.
     kind : str
         What is written there, such as ``"model"``: a file at `path` must be of the same kind.
-        NetCDF files state it in the attribute :data:`MARK`; others as ``seakeep_file: KIND`` in
-        their first or last kilobytes.
+        NetCDF files state it in the attribute :data:`MARK`; others as ``seakeep_file: KIND``.
     inputs : iterable of Path
         Files that the command reads.
     header : str, optional
@@ -554,16 +527,13 @@ def check_output(
             f"{path} is read by this command and would be overwritten by the {kind}. "
             "Choose another name."
         )
-    with path.open("rb") as file:
-        start = file.read(HEAD)
-        file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
-        both = start + file.read()  # PDF keeps its mark at the end
-    if path.suffix == ".nc" or start.startswith(HDF5):
+    content = path.read_bytes()
+    if path.suffix == ".nc" or content.startswith(HDF5):
         ours = _mark_of_netcdf(path) == kind
     elif path.suffix == ".csv":
-        ours = bool(header and re.match(header, both.decode("utf-8", "replace")))
+        ours = bool(header and re.match(header, content.decode("utf-8", "replace")))
     else:
-        ours = f"{MARK}: {kind}".encode() in both
+        ours = f"{MARK}: {kind}".encode() in content
     if not ours:
         raise RequestError(
             f"{path} exists and is not a {kind} that seakeep wrote; it may be a measurement. "
@@ -593,9 +563,6 @@ def check_report(folder: Path) -> None:
                 "would stand among them. Choose another folder (-o)."
             )
 
-
-HEAD = 65536
-"""Bytes of a file in which its mark is looked for."""
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """First bytes of a NetCDF file, for any suffix."""

@@ -20,7 +20,6 @@ so that their bounds are rough.
 """
 
 import functools
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
@@ -31,7 +30,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray, fraction, undefined
 from seakeep.core import metrics as core
 from seakeep.core.bootstrap import block_length, bootstrap_indices, student_interval
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import RequestError, quiet
 from seakeep.pairing import Paired, pair
 
 __all__ = [
@@ -172,8 +171,7 @@ def _block(p: FloatArray, m: FloatArray) -> int:
         parts = np.sqrt(square / variance) * (error / square - apart / variance)
     parts = np.where(np.isfinite(parts), parts, 0.0).sum(axis=-1)
     series = parts.reshape(-1, p.shape[-2]).mean(axis=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)  # few blocks widen the interval
+    with quiet():  # few blocks widen the interval
         return 1 if np.ptp(series) == 0 else block_length(series, "politis_white")
 
 

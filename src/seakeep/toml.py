@@ -171,10 +171,9 @@ def optional(description: str, default: Any = None) -> Any:
     return Field(default=default, description=description)
 
 
-def number(value: float | Length) -> float:
-    """Value of a key once :func:`in_seconds` has resolved its table."""
-    assert not isinstance(value, Length)
-    return value
+def in_seconds(value: float | Length, period: float) -> float:
+    """Value of a key in seconds or hertz, for an encounter period in seconds."""
+    return value.at(period) if isinstance(value, Length) else value
 
 
 def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -186,51 +185,6 @@ def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, .
             yield from lengths(each, (*place, name))
     elif isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
         yield place
-
-
-def in_seconds(table: Settings, period: float, places: Iterable[tuple[str, ...]]) -> Settings:
-    """Replace the :class:`Length` at each of some places of a table by seconds or hertz.
-
-    Parameters
-    ----------
-    table : BaseModel
-        The settings.
-    period : float
-        Encounter period, s.
-    places : iterable of tuple of str
-        Some of its :func:`lengths`.
-
-    Returns
-    -------
-    BaseModel
-        A copy; the table itself where there is no place.
-
-    Raises
-    ------
-    RequestError
-        If a span of which one end counts in periods runs backwards.
-    """
-    for place in places:
-        table = _resolved(table, period, place, place)
-    return table
-
-
-def _resolved(value: Any, period: float, place: tuple[str, ...], ahead: tuple[str, ...]) -> Any:
-    """A value in seconds where no key is `ahead`, else the table that holds it there."""
-    if ahead:
-        name, *rest = ahead
-        inner = dict(value)
-        inner[name] = _resolved(inner[name], period, place, tuple(rest))
-        return inner if isinstance(value, dict) else value.model_copy(update={name: inner[name]})
-    if isinstance(value, Length):
-        return value.at(period)
-    start, end = (each.at(period) if isinstance(each, Length) else each for each in value)
-    if not start < end:
-        raise RequestError(
-            f"{'.'.join(place)}: received [{value[0]}, {value[1]}], which with an encounter "
-            f"period of {period:.6g} s is [{start:g}, {end:g}]. State the lower one first."
-        )
-    return start, end
 
 
 Mistake = tuple[tuple[str, ...], str]

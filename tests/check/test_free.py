@@ -7,7 +7,7 @@ from oscillators import Oscillator
 from records import record
 
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
-from seakeep.check.parts import free_windows, samples_in
+from seakeep.check.parts import samples_in
 from seakeep.core.extremes import free_decay
 from seakeep.errors import DataError, SeakeepWarning
 
@@ -116,10 +116,12 @@ def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():
         input_delays=Fixed("0.1 T"), ridge=LogUniform(0.1, 10.0), n_members=3, seed=0,
     )  # fmt: skip
     ensemble = spec.fit(run, ["heave"], ["eta_fwd"], stop=20.0)
-    starts = np.array([21.0, 25.0])
-    made = free_windows(ensemble, run, starts, 20)
-    each = [ensemble.forecast(run, start, 20)["heave"].mean("member").values for start in starts]
-    np.testing.assert_allclose(made[..., 0], each, rtol=1e-12)
+    starts = np.searchsorted(run.time.values, [21.0, 25.0])
+    made, measured = ensemble.judged_runs(run, "run", starts, 20)
+    for at, free, truth in zip(starts, made, measured, strict=True):
+        members = ensemble.forecast(run, float(run.time[at]), 20)["heave"]
+        np.testing.assert_allclose(free[:, 0], members.mean("member"), rtol=1e-12)
+        np.testing.assert_array_equal(truth[:, 0], run.heave[at + 1 : at + 21])
 
 
 def test_a_forecast_starts_where_the_waves_have_come():

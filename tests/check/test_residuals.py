@@ -7,7 +7,6 @@ from records import record
 from scipy import signal
 
 from seakeep import HankelDMDc, check
-from seakeep.check.parts import free_windows
 from seakeep.core.spectra import autocorrelation, input_correlation, ljung_box
 
 
@@ -81,7 +80,7 @@ def test_limits_and_past_inputs_are_those_of_the_errors_by_hand(run):
     found = check.residuals(model, {"run": run})
     assert found.limit == pytest.approx(1.96 / np.sqrt(1499), rel=1e-12)
     first, last = 1500, 2999  # the last measured state before each step of the test part
-    made = free_windows(model, run, run.time.values[first:last], 1)[:, 0, 0]
+    made = model.judged_runs(run, "run", range(first, last), 1)[0][:, 0, 0]
     error = made - run.heave.values[first + 1 : last + 1]
     inputs = run.eta.values[first + 1 : last + 1]
     e, u = error - error.mean(), inputs - inputs.mean()

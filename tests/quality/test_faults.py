@@ -51,6 +51,10 @@ def faulty(x, kind, length, place):
     return x
 
 
+def test_sixteen_samples_are_enough_to_be_judged():
+    assert not reported(waves()[:16])
+
+
 @pytest.mark.parametrize("length", [1, 3, 4, 5, 10, 40, 300, 1600, 3000])
 @pytest.mark.parametrize("kind", ["held", "zero", "-99.9", "spiked", "burst"])
 def test_a_fault_of_any_length_is_reported(kind, length):

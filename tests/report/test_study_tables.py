@@ -12,7 +12,7 @@ from rich.console import Console
 from seakeep.report.quality_sheet import clock_rows
 from seakeep.report.sections.data import setting_text
 from seakeep.report.tables import Number, Table, number, rich_tables, write_csv, write_latex
-from seakeep.signals.synchronisation import Clock
+from seakeep.signals import Clock
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from seakeep.signals import bridge, inspect_times, onto_uniform
+from seakeep import DataError
+from seakeep.signals import bridge, inspect_times, onto_uniform, uniform_step
 
 
 def test_gaps_are_told_and_masked():
@@ -19,6 +20,15 @@ def test_gaps_are_told_and_masked():
     assert_allclose(time, t, atol=1e-12)
     assert_array_equal(np.isnan(x), ~kept)
     assert_array_equal(x[kept], np.sin(t[kept]))
+
+
+def test_rounding_of_times_does_not_add_up_over_a_long_gap():
+    t = np.arange(1800) / 30 + 20 * (np.arange(1800) >= 900)
+    report = inspect_times(np.round(t, 3))
+    assert (report.missing, report.jittered) == (600, False)
+    assert report.step == pytest.approx(1 / 30, rel=1e-6)
+    with pytest.raises(DataError, match=r"600 sample\(s\) of 0\.0333333 s are missing"):
+        uniform_step(np.round(t, 3))
 
 
 def test_jitter_is_told_and_interpolated_away():

@@ -17,7 +17,7 @@ from seakeep.study import read_study, run_study
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
-from seakeep.study.store import LOCK, UNITS, UnitFolder
+from seakeep.study.store import LOCK, RESULT, UNITS, UnitFolder
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -126,6 +126,14 @@ def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
     assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
     second.write("cell", CELL)
     with pytest.raises(RequestError, match="holds the results of another study"):
+        UnitFolder(tmp_path, "one").open("first")
+
+
+@pytest.mark.parametrize("result", [f"{UNITS}/one.nc", RESULT])
+def test_results_that_name_no_study_are_not_overwritten(result, tmp_path):
+    (tmp_path / UNITS).mkdir()
+    (tmp_path / result).write_bytes(b"")
+    with pytest.raises(RequestError, match=r"holds results, and .* does not say of which study"):
         UnitFolder(tmp_path, "one").open("first")
 
 

@@ -252,7 +252,6 @@ def test_other_vessels_need_no_code(settings, hydro):
         far_field=hydro.far_field[:, :, :4, :4],
         mass=hydro.mass[part, part],
         stiffness=hydro.stiffness[part, part],
-        pool=None,
     )
     lines = {"single": settings.moorings["bow"].model_copy(update={"pretension": 0.0})}
     other = settings.model_copy(update={"moorings": lines})

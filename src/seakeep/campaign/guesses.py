@@ -11,7 +11,15 @@ from typing import Literal
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
+from seakeep.campaign.readers import (
+    CALLED,
+    kinds_of,
+    motions_of,
+    time_column,
+    time_step_of,
+    time_unit_of,
+    words_of,
+)
 from seakeep.conventions import (
     MOTIONS,
     Channel,
@@ -27,10 +35,6 @@ from seakeep.quality.faults import noise_share
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, first_wave, tapered_power
-from seakeep.toml import packaged
-
-_CALLED = packaged("campaign/vocabulary.toml")
-"""Words of columns, runs and places in files of others."""
 
 LONG = 64
 """Samples that a column must have for its waves or its step to be judged."""
@@ -213,19 +217,13 @@ def _start(run: str, files: Files, guesses: Guesses) -> float:
 
 def waves_of_name(run: str) -> str | None:
     """Say "regular" or "irregular" if the name of a run does."""
-    kinds = _kinds(_words(run))
+    kinds = kinds_of(run)
     return next((kind for kind in ("irregular", "regular") if kind in kinds), None)
 
 
 def is_trigger(column: str) -> bool:
     """Whether a column may hold the pulses that all loggers recorded."""
-    return "trigger" in _kinds(_words(column))
-
-
-def is_wave(column: str) -> bool:
-    """Whether a column is called as those of wave probes are, and not as a motion."""
-    words = _words(column)
-    return "wave" in _kinds(words) and not any(_motions(words))
+    return "trigger" in kinds_of(column)
 
 
 def _plain(text: str) -> str:
@@ -368,7 +366,7 @@ def _guess(column: str, files: Files) -> Guess:
     canonical = canonical_channel(channel)
     unit = unit if unit is not None else canonical.units if canonical else "-"
     return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
-                 behind="behind" in _kinds(_words(column)))  # fmt: skip
+                 behind="behind" in kinds_of(column))  # fmt: skip
 
 
 def _printable(text: str) -> str:
@@ -406,7 +404,7 @@ def _rising_column(table: Columns) -> str:
         unit = table.units.get(column) or named_unit(column)[1]
         if unit and not (is_unit(unit) and si_unit(unit) == "s"):
             continue
-        if "time" in _kinds(_words(column)) and series.size >= LONG and np.all(np.diff(series) > 0):
+        if "time" in kinds_of(column) and series.size >= LONG and np.all(np.diff(series) > 0):
             return column
         if not even and _step_of(series) not in (None, 1.0):
             even = column
@@ -427,41 +425,18 @@ def _listed(files: Files) -> str:
     return ", ".join(f"{f.run}/{f.path.name}" if f.logger else f.path.name for f in files[:3])
 
 
-def _words(column: str) -> list[str]:
-    """Words of a name, lower case: split at signs, digits and changes of case."""
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", column)
-    return [word for word in re.split(r"[^A-Za-z0-9]+", spaced.lower()) if word]
-
-
-def _kinds(words: Sequence[str]) -> set[str]:
-    """What words may mean, by the keys of the vocabulary."""
-    return {kind for kind, called in _CALLED.items() if not set(called).isdisjoint(words)}
-
-
-def _motions(words: Sequence[str]) -> Iterator[str]:
-    """Canonical motions that words may mean, the likeliest first."""
-    # Of two sensors of one acceleration, neither is the motion of the body; nor is a load.
-    kinds = _kinds(words)
-    if kinds & {"sides", "load"}:
-        return
-    said = next((f"_{kind}" for kind in ("acceleration", "rate") if kind in kinds), "")
-    for motion, known in _CALLED["motion"].items():
-        if not set(known).isdisjoint(words):
-            yield from (motion + each for each in (said, "", "_rate", "_acceleration"))
-
-
-def _channels(words: Sequence[str], dimension: str | None, logger: str) -> Iterator[str]:
+def _channels(column: str, dimension: str | None, logger: str) -> Iterator[str]:
     """Canonical channels that words, unit and logger may mean, the likeliest first."""
-    kinds = _kinds(words)
+    words, kinds = words_of(column), kinds_of(column)
     numbers = [word for word in words if word.isdigit()]
     if "wave" in kinds:
-        yield "eta_" + ("_".join([w for w in words if w in _CALLED["place"]] + numbers) or "1")
-    if dimension == "m" and "wave" in _kinds(_words(logger)):
+        yield "eta_" + ("_".join([w for w in words if w in CALLED["place"]] + numbers) or "1")
+    if dimension == "m" and "wave" in kinds_of(logger):
         yield "eta_" + "_".join(words)
-    yield from _motions(words)
-    if "load" in kinds and set(words).isdisjoint(chain(*_CALLED["motion"].values())):
-        ends = [_CALLED["ends"][word] for word in words if word in _CALLED["ends"]]
-        sides = [_CALLED["sides"][word] for word in words if word in _CALLED["sides"]]
+    yield from motions_of(column)
+    if "load" in kinds and set(words).isdisjoint(chain(*CALLED["motion"].values())):
+        ends = [CALLED["ends"][word] for word in words if word in CALLED["ends"]]
+        sides = [CALLED["sides"][word] for word in words if word in CALLED["sides"]]
         if place := list(dict.fromkeys(ends)) or sides or numbers:
             yield "mooring_" + "_".join(place)
 
@@ -471,14 +446,14 @@ def suggest_channel(column: str, unit: str | None, logger: str) -> str:
 
     A length of a logger called "wave_probes" is an elevation.
     """
-    words = _words(column)
+    words = words_of(column)
     dimension = None if unit is None else si_unit(unit)
 
     def fits(name: str) -> bool:
         canonical = canonical_channel(name)
         return canonical is not None and dimension in (None, canonical.units)
 
-    if suggested := next(filter(fits, _channels(words, dimension, logger)), None):
+    if suggested := next(filter(fits, _channels(column, dimension, logger)), None):
         return suggested
     free = "_".join(words) or "channel"
     free = free if not free[0].isdigit() else f"column_{free}"

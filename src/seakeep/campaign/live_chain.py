@@ -18,7 +18,7 @@ from seakeep.arrays import ArrayLike, FloatArray, as_real
 from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, resampled
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
-from seakeep.errors import RequestError, SeakeepError, did_you_mean
+from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed
 
 STATE = "state of a live chain"
@@ -78,18 +78,34 @@ class LiveChain:
         DataError
             If the chain cannot use the samples. Nothing was taken then, as with a RequestError.
         """
-        before = self._rows, self._origin, self._given
-        new = {key: self._checked(key, table) for key, table in samples.items()}
-        self._rows = self._rows | {
-            key: {n: np.concatenate([x, more[n]]) for n, x in self._rows[key].items()}
-            for key, more in new.items()
-        }
-        try:
-            self._check_all_send()
-            return self._handed_out()
-        except SeakeepError:
-            self._rows, self._origin, self._given = before
-            raise
+        rows = dict(self._rows)
+        for key, table in samples.items():
+            more = self._checked(key, table)
+            rows[key] = {name: np.concatenate([x, more[name]]) for name, x in rows[key].items()}
+        instants = {key: self._instants(key, table) for key, table in rows.items()}
+        self._check_all_send(instants)
+        origin, given, ready = self._origin, self._given, 0
+        if all(each.size for each in instants.values()):
+            if origin is None:
+                # As offline: multiples of the step from the first instant of the reference.
+                firsts = [each[0] for each in instants.values()]
+                origin = firsts[0]
+                given = math.ceil((max(firsts) - origin + self.delay) / self.dt - 1e-6)
+            newest = min(each[-1] for each in instants.values())
+            ready = math.floor((newest - self.delay - origin) / self.dt + 1e-9) + 1
+        if origin is None or ready - given < self.every:
+            empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
+            out = xr.Dataset(empty, coords={"time": np.empty(0)})
+        else:
+            out = self._prepared(rows, origin, given, ready)
+            given = ready
+            # Rows that have left the window are forgotten.
+            oldest = origin + ready * self.dt + self.delay - self.window
+            for key, table in rows.items():
+                kept = slice(np.searchsorted(instants[key], oldest), None)
+                rows[key] = {name: values[kept] for name, values in table.items()}
+        self._rows, self._origin, self._given = rows, origin, given
+        return out
 
     def save(self, path: str | Path) -> Path:
         """Write the rows that the chain still needs, for :meth:`resume` in another process.
@@ -145,29 +161,6 @@ class LiveChain:
     def _columns(self) -> list[object]:
         return [self.dt, {key: list(table) for key, table in self._rows.items()}]
 
-    def _handed_out(self) -> xr.Dataset:
-        """Model samples that are ready, and no row kept that none needs any more."""
-        if self._origin is None and all(len(self._instants(key)) for key in self._rows):
-            # As offline: multiples of the step from the first instant of the reference.
-            firsts = [self._instants(key)[0] for key in self._rows]
-            self._origin = firsts[0]
-            self._given = math.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6)
-        ready = 0
-        if self._origin is not None:
-            newest = min(self._instants(key)[-1] for key in self._rows)
-            ready = math.floor((newest - self.delay - self._origin) / self.dt + 1e-9) + 1
-        if self._origin is None or ready - self._given < self.every:
-            empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
-            return xr.Dataset(empty, coords={"time": np.empty(0)})
-        run = self._prepared(self._origin, self._given, ready)
-        self._given = ready
-        # Rows that have left the window are forgotten.
-        oldest = self._origin + ready * self.dt + self.delay - self.window
-        for key, table in self._rows.items():
-            first = np.searchsorted(self._instants(key), oldest)
-            self._rows[key] = {name: values[first:] for name, values in table.items()}
-        return run
-
     def _checked(self, key: str, table: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
         if key not in self._rows:
             raise RequestError(
@@ -197,14 +190,13 @@ class LiveChain:
             )
         return arrays
 
-    def _instants(self, key: str) -> FloatArray:
+    def _instants(self, key: str, table: Mapping[str, FloatArray]) -> FloatArray:
         """Instants of a logger's rows on the reference's clock."""
         name, factor = self._time[key]
-        return self._run.clocks[key].reference(self._rows[key][name] * factor)
+        return self._run.clocks[key].reference(table[name] * factor)
 
-    def _check_all_send(self) -> None:
+    def _check_all_send(self, instants: Mapping[str, FloatArray]) -> None:
         """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
-        instants = {key: self._instants(key) for key in self._rows}
         start = min((each[0] for each in instants.values() if each.size), default=0.0)
         newest = {key: each[-1] if each.size else start for key, each in instants.items()}
         last = min(newest, key=newest.__getitem__)
@@ -215,11 +207,13 @@ class LiveChain:
                 "Send rows of it up to the others' instants, NaN in its columns."
             )
 
-    def _prepared(self, origin: float, first: int, stop: int) -> xr.Dataset:
+    def _prepared(
+        self, rows: Mapping[str, dict[str, FloatArray]], origin: float, first: int, stop: int
+    ) -> xr.Dataset:
         """Model samples of these numbers, by the chain over the whole window."""
         dt = self.dt
         loggers = {
-            key: replace(logger, columns=replace(logger.columns, values=self._rows[key]))
+            key: replace(logger, columns=replace(logger.columns, values=rows[key]))
             for key, logger in self._run.loggers.items()
         }
         run = derived(cleaned(mapped(replace(self._run, loggers=loggers))))

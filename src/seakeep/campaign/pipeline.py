@@ -24,10 +24,10 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.campaign.derivation import derive, needed_channels, sources_of
-from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
     counts_samples,
     find_column,
+    is_wave,
     time_column,
     time_step_of,
     times_of,
@@ -36,7 +36,6 @@ from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
     FileSettings,
-    InstrumentsSettings,
     PreparationSettings,
     RunSettings,
     long_name_of,
@@ -73,9 +72,15 @@ from seakeep.signals import (
     resample,
     uniform_step,
 )
-from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import inside, instant_text, span_text, stretches, usual_step
-from seakeep.toml import Length, number
+from seakeep.signals.time_axis import (
+    ASSUMED,
+    inside,
+    instant_text,
+    span_text,
+    stretches,
+    usual_step,
+)
+from seakeep.toml import in_seconds
 
 ChannelMap = dict[str, ChannelSettings]
 COMMON = "the common step"
@@ -118,9 +123,11 @@ class Run:
     name : str
         Its name.
     settings : CampaignSettings
-        The campaign, lengths in seconds.
+        The campaign.
     loggers : mapping of str to Logger
         Its files, the reference first.
+    period : float
+        Encounter period, s; NaN where it is not known.
     clocks : mapping of str to Clock
         Clock of each logger.
     groups : mapping of str to Dataset
@@ -130,12 +137,13 @@ class Run:
     data : Dataset or None
         All channels on one axis.
     findings : sequence of Finding
-        Results of the checks.
+        Results of the checks; before them, what speaks against its counted period.
     """
 
     name: str
     settings: CampaignSettings
     loggers: Mapping[str, Logger]
+    period: float = np.nan
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     groups: Datasets = field(default_factory=dict)
     ahead: Sequence[str] = ()
@@ -161,12 +169,25 @@ class Run:
         columns = [each.columns.values for each in self.loggers.values()]
         return sum(values.nbytes for own in columns for values in own.values())
 
+    def span(self, key: str) -> tuple[float, float] | None:
+        """Start and end (s) that a key of the run's table states."""
+        stated = getattr(self.own, key)
+        if not stated:
+            return None
+        start, end = (in_seconds(edge, self.period) for edge in stated)
+        if not start < end:
+            raise RequestError(
+                f"runs.{self.name}.{key}: received [{stated[0]}, {stated[1]}], which with an "
+                f"encounter period of {self.period:.6g} s is [{start:g}, {end:g}]. State the lower "
+                "one first."
+            )
+        return start, end
+
     @property
     def used_span(self) -> tuple[float, float]:
         """First and last instant that is used at all, s."""
-        own = self.own
-        stated = (own.span,) if own.span else (own.train, own.test)
-        edges = [number(edge) for span in stated if span for edge in span]
+        keys = ("span",) if self.own.span else ("train", "test")
+        edges = [edge for key in keys for edge in self.span(key) or ()]
         return min(edges, default=-np.inf), max(edges, default=np.inf)
 
     @property
@@ -199,7 +220,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path]) -> Ru
         loggers[key] = Logger(key, path, columns, options)
     order = [settings.instruments.reference, *settings.instruments.loggers, *loggers]
     reference = min(loggers, key=order.index)
-    return Run(name, settings, {reference: loggers.pop(reference), **loggers})
+    loggers = {reference: loggers.pop(reference), **loggers}
+    return Run(name, settings, loggers, settings.campaign.encounter_period or np.nan)
 
 
 def sync(run: Run) -> Run:
@@ -208,14 +230,14 @@ def sync(run: Run) -> Run:
     by_reference = {reference.name: Clock()}
     for each in others:
         with naming(f"run '{run.name}', clock of '{each.name}' ({each.path})"):
-            by_reference[each.name] = _clock(each, reference, run.settings.instruments)
+            by_reference[each.name] = _clock(run, each, reference)
     return replace(run, clocks=by_reference)
 
 
-def _clock(logger: Logger, reference: Logger, instruments: InstrumentsSettings) -> Clock:
-    own = instruments[logger.name]
+def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
+    own, period = run.settings.instruments[logger.name], run.period
     if own.trigger is not None:
-        theirs = instruments[reference.name].trigger
+        theirs = run.settings.instruments[reference.name].trigger
         if theirs is None:
             raise RequestError(
                 f"'{logger.name}' states a trigger and the reference '{reference.name}' none. Add "
@@ -235,7 +257,8 @@ def _clock(logger: Logger, reference: Logger, instruments: InstrumentsSettings) 
     if not np.ptp(series) or not np.ptp(other):
         raise DataError(f"'{pair[0]}' or '{pair[1]}' is constant. Choose signals that move.")
     find = clock_from_shared if own.shared else clock_from_correlation
-    return find(series, time, other, instants, number(own.window), number(own.largest_lag))
+    window, largest_lag = in_seconds(own.window, period), in_seconds(own.largest_lag, period)
+    return find(series, time, other, instants, window, largest_lag)
 
 
 def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
@@ -297,7 +320,7 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
     time = run.clocks[logger.name].reference(logger.time)
     is_reference = logger.name == next(iter(run.loggers))
     slack = usual_step(time) * (1 + 1e-6) if is_reference else np.inf
-    span, whole = run.own.record or (-np.inf, np.inf), (time[0], time[-1])
+    span, whole = run.span("record") or (-np.inf, np.inf), (time[0], time[-1])
     records = _part(f"runs.{run.name}.record", span, time, whole, slack)
     variables = {}
     for name, each in channels.items():
@@ -531,8 +554,7 @@ def _on_axis(run: Run, group: xr.Dataset, wanted: FloatArray, dt: float) -> dict
     if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
         # The last instant may lie a rounding beyond the record.
         clipped = np.clip(wanted, time[0], time[-1])
-        fine = not settings.anti_alias and dt > own
-        series = resample(series, time, clipped, settings.attenuation, anti_alias=not fine)
+        series = resample(series, time, clipped, settings.attenuation, settings.anti_alias)
     else:
         series = series[: wanted.size]
     out = {
@@ -563,7 +585,7 @@ def strays(own: float, samples: int, dt: float) -> bool:
 def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
     """Groups of ``[redundant]`` with their windows in seconds, for an encounter period (s)."""
     return {
-        each.channels: each.window.at(period) if isinstance(each.window, Length) else each.window
+        each.channels: None if each.window is None else in_seconds(each.window, period)
         for each in settings.redundant.values()
     }
 
@@ -575,7 +597,7 @@ def cropped(run: Run) -> Run:
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     step = (record[1] - record[0]) / (reference.size - 1)
     slack = max(usual_step(time), step) * (1 + 1e-6)
-    stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
+    stated = {key: run.span(key) for key in ("span", "train", "test")}
     spans = {key: span for key, span in stated.items() if span}
     parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
     if "span" in parts:
@@ -589,15 +611,13 @@ def cropped(run: Run) -> Run:
     return replace(run, data=data, groups=groups)
 
 
-def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str, str]) -> Run:
+def checked(run: Run, left_out: Mapping[str, str]) -> Run:
     """Step 8: look for faults.
 
     Parameters
     ----------
     run : Run
         The run, on one axis, cut to its span.
-    period : (float, float) or None
-        Counted period and energy period of its waves, s, where they disagree.
     left_out : mapping of str to str
         Runs left out of what is pooled, and why.
     """
@@ -606,7 +626,8 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
     for name in run.groups:
         own = settings.instruments[name] if name else settings.files
         if own.sampling_rate:
-            rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
+            is_guess = own.time is None and own.sampling_rate_assumed
+            rates[name] = Rate(own.sampling_rate, is_guess)
     channels = run.channels
     units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
     waves = {
@@ -622,10 +643,8 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         span=run.used_span,
         waves=run.own.waves,
         water_depth=settings.rig.water_depth,
-        wave_channel=settings.wave_channel,
-        period=period,
         stated_period=settings.campaign.encounter_period,
-        redundant=redundant_pairs(settings, np.nan),
+        redundant=redundant_pairs(settings, run.period),
         rates=rates,
         assumed_units=units,
         wave_columns=waves,
@@ -633,12 +652,12 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         anti_alias=preparation.anti_alias,
         left_out=left_out,
     )
-    return replace(run, findings=check(record))
+    return replace(run, findings=[*check(record), *run.findings])
 
 
 def _part(
     key: str,
-    stated: tuple[float | Length, float | Length],
+    span: tuple[float, float],
     time: FloatArray,
     record: tuple[float, float],
     slack: float,
@@ -647,17 +666,18 @@ def _part(
 
     Refused is also a span that reaches beyond the reference's record by more than a slack.
     """
-    dt, span = usual_step(time), (number(stated[0]), number(stated[1]))
-    shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
+    dt = usual_step(time)
     finite = [edge for edge in span if np.isfinite(edge)]
-    if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
+    outside = any(not record[0] - slack <= edge <= record[1] + slack for edge in finite)
+    used = inside(time, span, dt)
+    if (count := used.sum()) > 1 and not outside:
+        return used
+    shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
+    if outside:
         raise RequestError(
             f"{key}: received {shown}, and the record runs from "
             f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
-    used = inside(time, span, dt)
-    if (count := used.sum()) > 1:
-        return used
     lacks = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
     common = span_text(time[0], time[-1], dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:

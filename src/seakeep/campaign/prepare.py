@@ -23,7 +23,7 @@ from seakeep.quality import as_json, judge_runs, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
-from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
+from seakeep.toml import lengths, parse_length, read_toml, validated
 
 FORMAT = 13
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
@@ -123,10 +123,6 @@ class Campaign:
     def _lengths(self) -> list[tuple[str, ...]]:
         """Places of what counts in encounter periods; models keep theirs, which become samples."""
         return [place for place in lengths(self.settings) if place[0] not in ("model", "models")]
-
-    def _in_seconds(self, period: float | None) -> CampaignSettings:
-        """Settings with what counts in encounter periods turned into seconds and hertz."""
-        return in_seconds(self.settings, period, self._lengths) if period else self.settings
 
     def files_of(self, name: str) -> dict[str, Path]:
         """Paths of a run's files.
@@ -239,20 +235,17 @@ class Campaign:
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
-        """Clocks of the wanted runs, the encounter period if needed, and settings in seconds."""
+        """Clocks of the wanted runs, and the encounter period if needed."""
         for name in wanted:
             self._run(name)
         stated = self.settings.campaign.encounter_period
-        settings = self._in_seconds(stated)
         channel = self.period_channel() if needs_period and not stated else None
-        if channel and not settings.period_runs:
+        if channel and not self.settings.period_runs:
             raise RequestError(
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
-        surveyed = survey(settings, self.files_of, wanted, channel, progress, failures)
-        period = stated or surveyed.period
-        return replace(surveyed, settings=self._in_seconds(period), period=period)
+        return survey(self.settings, self.files_of, wanted, channel, progress, failures)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -398,7 +391,7 @@ class Campaign:
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
                 run = cropped(resampled(run, dt))
-                run = checked(run, surveyed.doubts.get(name), surveyed.left_out)
+                run = checked(run, surveyed.left_out)
                 warn_of(run.findings, reported)
                 data = run.data
                 data.attrs["quality"] = as_json(run.findings)
@@ -460,7 +453,7 @@ class Campaign:
         changed: dict[str, Any] = {"runs": {**settings.runs, run: whole}}
         if settings.preparation.gaps == "refuse":  # rows get lost in service
             changed["preparation"] = settings.preparation.model_copy(update={"gaps": "mask"})
-        source = replace(surveyed, settings=settings.model_copy(update=changed)).read(run)
+        source = replace(surveyed.read(run), settings=settings.model_copy(update=changed))
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
     def _attributes(self, run: Run, dt: float) -> dict[str, Any]:
@@ -488,7 +481,7 @@ class Campaign:
         }
         whole = (time[0], time[-1])
         for use in ("train", "test"):
-            span = getattr(settings, use)
+            span = run.span(use)
             if not span and settings.serves == use:
                 span = whole
             if span:

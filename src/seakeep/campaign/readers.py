@@ -1,9 +1,9 @@
-"""A run's file as a table with a time axis: :func:`read_table`."""
+"""A run's file as a table with a time axis: :func:`read_table`; what its columns may be called."""
 
 import hashlib
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,8 @@ from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text, usual_step
 from seakeep.toml import packaged
 
-_TIMES = packaged("campaign/vocabulary.toml")["time"]
+CALLED = packaged("campaign/vocabulary.toml")
+"""Words of columns, runs and places in files of others."""
 COUNTED = 64
 """Times from which a column that counts 1, 2, 3 may count samples."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
@@ -141,7 +142,7 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
         bare, unit = named_unit(name)
         if unit and si_unit(unit) != "s":
             bare = name
-        if bare.strip().lower() in _TIMES:
+        if bare.strip().lower() in CALLED["time"]:
             return name
     return None
 
@@ -225,3 +226,32 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
                 "with more decimals."
             )
     return name, check_order(times, str(path))
+
+
+def is_wave(column: str) -> bool:
+    """Whether a column is called as those of wave probes are, and not as a motion."""
+    return "wave" in kinds_of(column) and not any(motions_of(column))
+
+
+def words_of(column: str) -> list[str]:
+    """Words of a name, lower case: split at signs, digits and changes of case."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", column)
+    return [word for word in re.split(r"[^A-Za-z0-9]+", spaced.lower()) if word]
+
+
+def kinds_of(column: str) -> set[str]:
+    """What the words of a name may mean, by the keys of the vocabulary."""
+    words = words_of(column)
+    return {kind for kind, called in CALLED.items() if not set(called).isdisjoint(words)}
+
+
+def motions_of(column: str) -> Iterator[str]:
+    """Canonical motions that the words of a name may mean, the likeliest first."""
+    # Of two sensors of one acceleration, neither is the motion of the body; nor is a load.
+    kinds, words = kinds_of(column), words_of(column)
+    if kinds & {"sides", "load"}:
+        return
+    said = next((f"_{kind}" for kind in ("acceleration", "rate") if kind in kinds), "")
+    for motion, known in CALLED["motion"].items():
+        if not set(known).isdisjoint(words):
+            yield from (motion + each for each in (said, "", "_rate", "_acceleration"))

@@ -72,8 +72,7 @@ def write_prepared(
         write_sealed(run, files[name], PREPARED)
         steps[name] = run.attrs["dt"]
     if len(set(steps.values())) > 1:  # that of fresh runs was another, which only all runs show
-        for name, run in campaign.each_prepared(wanted, progress, failed):
-            write_sealed(run, files[name], PREPARED)
+        return write_prepared(campaign, out_dir, wanted, progress, True, failures)
     if missing:  # a run that is new may be odd beside the others, or make one of them odd
         every = _files(campaign, out_dir, None) | files
         runs = dict(_fresh(campaign, every))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -89,8 +90,8 @@ class Survey:
         channel; 0 where it was not asked for.
     left_out : dict of str to str
         By run, what it is left out of because it cannot be read, and why.
-    doubts : dict of str to (float, float)
-        By run, its counted period and the energy period of its waves, s, where they disagree.
+    doubts : dict of str to list of Finding
+        By run, what speaks against its counted period.
     """
 
     settings: CampaignSettings
@@ -99,7 +100,7 @@ class Survey:
     clocks: Mapping[str, Mapping[str, Clock]]
     period: float
     left_out: Mapping[str, str]
-    doubts: Mapping[str, tuple[float, float]]
+    doubts: Mapping[str, Sequence[Finding]]
 
     @property
     def dt(self) -> float | None:
@@ -112,7 +113,12 @@ class Survey:
     def read(self, name: str) -> Run:
         """Steps 1 and 2: a run's files, their clocks known."""
         run = self.kept.pop(name, None) or read(name, self.settings, self.files_of(name))
-        return replace(run, settings=self.settings, clocks=self.clocks[name])
+        return replace(
+            run,
+            period=self.period,
+            clocks=self.clocks[name],
+            findings=self.doubts.get(name, ()),
+        )
 
     def channels(self, name: str) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""
@@ -142,7 +148,7 @@ def survey(
     kept: dict[str, Run] = {}
     free = KEPT
     clocks = {}
-    spans = {}
+    counted = {}
     bad, left_out = {}, {}
     for count, name in enumerate(runs, 1):
         if progress:
@@ -154,7 +160,7 @@ def survey(
                 free -= run.size
             clocks[name] = dict(run.clocks)
             if name in period_runs:
-                spans[name] = _period(run, str(channel))
+                counted[name] = _counted(run, str(channel))
         except SeakeepError as error:
             if name in asked:
                 spare(failures, name, error)
@@ -165,19 +171,15 @@ def survey(
                 f"run '{name}' is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
                 f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
             )
-    long = {name: each for name, each in spans.items() if each[3] >= FEWEST} or spans
-    period = float(np.mean([each[0] for each in long.values()])) if long else 0.0
-    doubts = {
-        name: (counted, energy)
-        for name, (counted, energy, steady, _) in spans.items()
-        if not 1 / LED <= energy / counted <= LED or steady > NOISY * counted
-    }
-    if bad and (not clocks or (period_runs and not spans)):
+    long = {name: each for name, each in counted.items() if each[1] >= FEWEST} or counted
+    measured = float(np.mean([each[0] for each in long.values()])) if long else 0.0
+    period = settings.campaign.encounter_period or measured
+    doubts = {name: each[2] for name, each in counted.items()}
+    if bad and (not clocks or (period_runs and not counted)):
         raise as_one(bad)
     for words in (words for name, words in left_out.items() if name not in asked):
         warn(words)
-    kind = ClocksKind.PERIOD
-    warn_of([Finding(kind, run, str(channel), *two, "s") for run, two in doubts.items()], set())
+    warn_of(chain.from_iterable(doubts.values()), set())
     _settle_drifts(clocks, pools)
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
     return Survey(settings, files_of, kept, alone | clocks, period, left_out, doubts)
@@ -192,23 +194,27 @@ def _settle_drifts(clocks: Mapping[str, dict[str, Clock]], pools: bool) -> None:
             each[logger] = without_doubtful_drift(clock)
 
 
-def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
-    """Counted and energy period of a run's waves, one that little noise leads (s), and waves."""
+def _counted(run: Run, channel: str) -> tuple[float, float, list[Finding]]:
+    """Counted period of the waves of a run (s), their number, and what speaks against it."""
     run = derived(cleaned(mapped(run, [channel])))
-    waves = next((group for group in run.groups.values() if channel in group), None)
-    if waves is None:  # it needs several loggers
-        waves = resampled(run, uniform_step(run.reference_time)).data
-    time, series = waves["time"].values, waves[channel].values
+    group = next((each for each in run.groups.values() if channel in each), None)
+    if group is None:  # it needs several loggers
+        group = resampled(run, uniform_step(run.reference_time)).data
+    time, series = group["time"].values, group[channel].values
     step = uniform_step(time, f"run '{run.name}'")
     used = inside(time, run.used_span, step)
     series = series[used] if used.sum() > 2 else series
     with naming(f"run '{run.name}', channel '{channel}'"):
         stated = run.settings.campaign.period_hysteresis
-        counted = encounter_period(series, step, stated)
-        steady = counted
-        if series.size * step > FEW * counted:
+        period = encounter_period(series, step, stated)
+        waves = series.size * step / period
+        steady = period
+        if waves > FEW:
             # A spike would make the SD so large that no wave is left.
             clipped = np.clip(series, *np.quantile(series, [0.001, 0.999]))
             steady = encounter_period(clipped, step, max(stated, 0.1))
     energy = energy_period(series[waves_part(series, step)], step)
-    return counted, energy, steady, series.size * step / counted
+    doubts = []
+    if not 1 / LED <= energy / period <= LED or steady > NOISY * period:
+        doubts.append(Finding(ClocksKind.PERIOD, run.name, channel, period, energy, "s"))
+    return period, waves, doubts

@@ -19,7 +19,7 @@ from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.worth import validity, worth
-from seakeep.errors import SeakeepError, SeakeepWarning
+from seakeep.errors import SeakeepError, SeakeepWarning, quiet
 from seakeep.models import Model
 from seakeep.models.labelled import check_channels
 
@@ -139,7 +139,6 @@ def check_model(
     if trained and of_part(runs, "test"):
         free: Known = {}
         for name in ("coherence", "residuals"):
-            with warnings.catch_warnings(), suppress(SeakeepError):
-                warnings.simplefilter("ignore", SeakeepWarning)
+            with quiet(), suppress(SeakeepError):
                 results[f"training_{name}"] = CHECKS[name](model, trained, free=free)
     return Checked(results, refused, notes)

@@ -124,17 +124,11 @@ def decay(model: Model) -> xr.Dataset:
         released = free_decay(left[np.isfinite(left)], single.dt)
         linear = released.decrements.mean() if released.cycles else np.nan
         damping = linear / np.hypot(2 * np.pi, linear)
-        rows.append((left, offset, released.period, damping, linear))
-    left, *facts = map(np.array, zip(*rows, strict=True))
-    keys = ("offset", "period", "damping_ratio", "p")
-    return xr.Dataset(
-        {"displacement": (("motion", "time"), left)}
-        | {key: ("motion", fact) for key, fact in zip(keys, facts, strict=True)},
-        coords={
-            "motion": motions,
-            "units": ("motion", units_of(single, motions)),
-            "time": ("time", single.dt * np.arange(steps + 1), {"units": "s"}),
-        },
+        facts = {"offset": offset, "period": released.period, "damping_ratio": damping, "p": linear}
+        rows.append(xr.Dataset({"displacement": ("time", left), **facts}))
+    return xr.concat(rows, xr.Variable("motion", motions)).assign_coords(
+        units=("motion", units_of(single, motions)),
+        time=("time", single.dt * np.arange(steps + 1), {"units": "s"}),
     )
 
 
@@ -183,10 +177,15 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
         if not found.cycles:
             raise DataError("no motion swings above its noise. Was anything released?")
         keys = ("period", "damping_ratio", "p", "q", "cycles")
-        facts = {"motion": motions[column], **{key: getattr(found, key) for key in keys}}
-        cycles = {"amplitude": found.amplitudes, "decrement": found.decrements}
-        facts |= {key: ("cycle", each) for key, each in cycles.items()}
-        return xr.Dataset(facts, {"cycle": range(found.cycles)})
+        return xr.Dataset(
+            {
+                "motion": motions[column],
+                **{key: getattr(found, key) for key in keys},
+                "amplitude": ("cycle", found.amplitudes),
+                "decrement": ("cycle", found.decrements),
+            },
+            {"cycle": range(found.cycles)},
+        )
 
     parts = gathered(still, released, "no run in still water is a free decay.", "no decay from")
     names = xr.Variable("run", list(parts))

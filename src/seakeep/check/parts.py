@@ -1,6 +1,5 @@
 """Data of the checks: test parts of runs without gaps, and free runs over them."""
 
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,7 +10,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
+from seakeep.errors import DataError, RequestError, SeakeepError, quiet, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, nearest_sample, run_step
 from seakeep.models.observables import at_once
@@ -47,14 +46,11 @@ class FreeRun(NamedTuple):
 
     Attributes
     ----------
-    start : float
-        Instant of the last measured state, s.
     time : ndarray, shape (time,)
     forecast, measured : ndarray, shape (time, N)
         For an ensemble the mean of its members.
     """
 
-    start: float
     time: FloatArray
     forecast: FloatArray
     measured: FloatArray
@@ -218,8 +214,7 @@ def beside(
     """Free runs of baselines over those of a model; one that lacks a run is left out."""
     others = {}
     for label, each in (baselines or {}).items():
-        with warnings.catch_warnings(), suppress(DataError):
-            warnings.simplefilter("ignore", SeakeepWarning)
+        with quiet(), suppress(DataError):
             others[label] = free_runs(each, runs, free, label, own)
     return {label: of for label, of in others.items() if of.keys() == own.keys()}
 
@@ -282,24 +277,17 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
 
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
     if like:
-        start, time, _, measured = like
+        time, _, measured = like
     else:
         at, last = window_of(model, run)
-        start, time = float(run["time"][at]), run["time"].values[at + 1 : last + 1]
+        time = run["time"].values[at + 1 : last + 1]
         measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+    start = float(time[0]) - model.dt
     if is_ensemble(model):
         forecast = model.forecast_summary(run, start, len(time)).sel(statistic="mean")
     else:
         forecast = model.forecast(run, start, len(time))
-    return FreeRun(start, time, channel_matrix(forecast, model.states, name), measured)
-
-
-def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
-    """Free runs from several starts, (window, steps, N); for an ensemble the members' mean."""
-    forecasts = model.forecast_windows(run, starts.tolist(), steps)
-    if "member" in forecasts.dims:
-        forecasts = forecasts[model.states].mean("member", skipna=False)
-    return np.stack([forecasts[name].values for name in model.states], axis=-1)
+    return FreeRun(time, channel_matrix(forecast, model.states, name), measured)
 
 
 def whole_span(run: xr.Dataset, *uses: str) -> tuple[float, float]:

@@ -11,7 +11,6 @@ from seakeep.check.parts import (
     FreeRun,
     Known,
     free_runs,
-    free_windows,
     gathered,
     judged,
     ratio,
@@ -73,10 +72,9 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         """Errors of one step over the test part, inputs and measured states at its instants."""
         run = runs[name]
         first, last = window_of(model, run)
-        forecasts = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
-        after = slice(first + 1, last + 1)
-        measured = channel_matrix(run, model.states, name, after)
-        inputs = channel_matrix(run, model.inputs, name, after)
+        both = model.judged_runs(run, name, range(first, last), 1)
+        forecasts, measured = (each[:, 0] for each in both)
+        inputs = channel_matrix(run, model.inputs, name, slice(first + 1, last + 1))
         sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
         if sound.sum() < 2:
             raise DataError("the model diverges, or nothing is measured.")
@@ -94,12 +92,10 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         run = runs[name]
         first, last = window_of(model, run)
         count = min(AGES * lags, last - first)
-        starts = np.arange(first, last - count + 1, lags)
-        forecasts = free_windows(model, run, run["time"].values[starts], count)
-        measured = channel_matrix(run, model.states, name)
-        rows = starts[:, None] + np.arange(1, count + 1)
+        starts = range(first, last - count + 1, lags)
+        forecasts, measured = model.judged_runs(run, name, starts, count)
         squares = np.full((len(starts), AGES * lags, len(model.states)), np.nan)
-        squares[:, :count] = (forecasts - measured[rows]) ** 2
+        squares[:, :count] = (forecasts - measured) ** 2
         return squares
 
     every, inputs, measured = zip(*stepped.values(), strict=True)

@@ -99,11 +99,10 @@ def worth(
     ]
     both = xr.concat([table.drop_dims("run") for table in tables], "waves")
     ends = ("", "_lower", "_upper")
-    out = both.rename({f"all_anrmse{end}": f"nrmse{end}" for end in ends})
+    out = xr.Dataset({f"nrmse{end}": both[f"all_anrmse{end}"] for end in ends}, attrs=both.attrs)
     # Of the model from a baseline: the other way round, so that the bounds change places.
     for key, other in {"": "change", "_lower": "upper", "_upper": "lower"}.items():
         out[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
-    out = out.drop_vars(both, errors="ignore")
     out = out.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
     upper = out["nrmse_upper"]
     most = upper.where(np.isfinite(upper), out["nrmse"]).sel(model="model", drop=True)

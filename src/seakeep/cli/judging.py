@@ -150,9 +150,8 @@ def forecast(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
         f"t = {begin} s, status {status}{reads and f'; {reads}'}."
     )
-    members_left = result.sizes.get("member", 0) - result.attrs.get("diverged", 0)
-    usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
-    if not usable:
+    all_lost = result.attrs.get("diverged", 0) == result.sizes.get("member")
+    if all_lost or "diverged_at" in result.attrs:
         raise Exit(1)
 
 
@@ -253,7 +252,7 @@ def compare(
         comparisons = compare_models(
             fitted,
             read,
-            run or (),
+            runs,
             start,
             steps,
             progress,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -84,16 +83,12 @@ def reproduce(
 
     Example: seakeep reproduce --quick --out quick
     """
-    from seakeep.executor import on_this_machine, submitting
     from seakeep.report.acts import finding, short_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
-    pages = []
     with executor_of(workers, scheduler, cores()) as executor:
-        near = on_this_machine(executor)
-        drawing = submitting(_write_act, None, near) if near else nullcontext()
-        with progress_bar("Study") as tell, drawing as submit:
+        with progress_bar("Study") as tell:
             results = reproduce_study(
                 out,
                 preset,
@@ -101,12 +96,7 @@ def reproduce(
                 seed=seed,
                 executor=executor,
                 progress=tell,
-                # While the next act runs.
-                finished=submit and (lambda result: pages.append(submit([result]))),
             )
-            for done, each in enumerate(pages):
-                tell(done, len(pages), "drawing the pages of the acts")
-                each.result()
         page = _write_reproduction(out, results, executor)
     print_table(short_table(results))
     show(finding(results))
@@ -138,15 +128,14 @@ def report(
 def _write_reproduction(
     folder: Path, results: dict[str, StudyResult], executor: Executor | None = None
 ) -> Path:
-    """Write the page over all acts, and those of the acts where no worker has drawn them."""
-    from seakeep.executor import on_this_machine
+    """Write the pages of the acts, side by side where workers are near, and the one over all."""
+    from seakeep.executor import in_order, on_this_machine
     from seakeep.report.acts import write_reproduction
-    from seakeep.report.sections import write_report
 
-    for each in () if on_this_machine(executor) else results.values():
-        with progress_bar(f"Report of {each.attrs['study']}") as tell:
-            write_report(each, tell)
     with progress_bar("Report") as tell:
+        pages = in_order(_write_act, None, [*results.values()], on_this_machine(executor))
+        for done, _ in enumerate(pages, start=1):
+            tell(done, len(results), "pages of the acts")
         return write_reproduction(folder, results, tell)
 
 

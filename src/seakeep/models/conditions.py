@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -12,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
-from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
+from seakeep.errors import DataError, RequestError, quiet, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.inputs import Scale
@@ -136,9 +135,8 @@ def disagreements(
         return settings.fit({name: halves[name] for name in names}, states, inputs)
 
     disagreeing: list[Disagreement] = []
-    # Halves may be too short, and runs without waves.
-    with warnings.catch_warnings(), contextlib.suppress(DataError, RequestError):
-        warnings.simplefilter("ignore", SeakeepWarning)  # given when all of the runs were fitted
+    # Halves may be too short, and runs without waves; warnings were given of the fit of all.
+    with quiet(), contextlib.suppress(DataError, RequestError):
         steps = round(PERIODS * labelled.mean_period(runs, inputs))
         judged = [name for name in runs if not regular_periods({name: runs[name]}, inputs)]
         alone = {name: fitted([name]) for name in judged}

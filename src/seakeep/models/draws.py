@@ -15,7 +15,6 @@ and counted.
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -26,7 +25,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.core.embedding import History
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep.errors import DataError, quiet
 from seakeep.models.inputs import InputMap
 from seakeep.models.priors import unit_of
 from seakeep.models.settings import HankelSettings
@@ -156,8 +155,7 @@ def _draw_member(
         }
         if refused := _out_of_range(own, shared.history):
             continue
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SeakeepWarning)  # given when the priors were made
+        with quiet():  # given when the priors were made
             settings = replace(shared, **own)
         lengths = drawn.get("window", np.nan), drawn["state_delays"], drawn["input_delays"]
         draw = Draw(settings, lengths, redrawn=redrawn)
@@ -239,8 +237,7 @@ def draws_of(dataset: xr.Dataset, shared: HankelSettings) -> tuple[Draw, ...]:
     rows = zip(*columns, strict=True)
     drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)
     members = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)  # given when the priors were made
+    with quiet():  # given when the priors were made
         for lengths, (ridge, window, s, z, run, last, redrawn) in zip(drawn, rows, strict=True):
             length, number, end = (None if each < 0 else each for each in (window, run, last))
             settings = replace(shared, ridge=ridge, window=length, state_delays=s, input_delays=z)

@@ -148,12 +148,15 @@ class Model:
     def judged_runs(
         self, run: xr.Dataset, name: str, starts: Sequence[int], steps: int
     ) -> tuple[FloatArray, FloatArray]:
-        """Free runs from samples of a run, and the measurement, each (window, steps, N)."""
+        """Free runs from samples of a run, and the measurement, each (window, steps, N).
+
+        Of an ensemble the members' mean.
+        """
         time = run["time"].values
         windows = self.read_windows(run, time[list(starts)].tolist(), steps, name=name)
         states = channel_matrix(run, self.states, name)
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
-        return self.free_runs([windows])[0][0], measured
+        return self._series(windows, None, None)[0].mean(axis=0), measured
 
     def summary(self) -> str:
         """Text that says what the model is."""

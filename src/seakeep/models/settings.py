@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
@@ -22,7 +21,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.core.embedding import History
-from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
+from seakeep.errors import SHOWN, RequestError, quiet, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.following import BACK, Following
@@ -474,8 +473,7 @@ class HankelSettings:
     def from_json(cls, content: Json) -> Self:
         """Settings from JSON values; an unknown key or a value out of range raises an error."""
         check_keys(cls, content)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SeakeepWarning)  # given when the settings were made
+        with quiet():  # given when the settings were made
             return cls(**content)
 
 

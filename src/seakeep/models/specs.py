@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import warnings
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
@@ -13,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, whole_number
-from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
+from seakeep.errors import SHOWN, DataError, RequestError, quiet
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR
@@ -451,8 +450,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             for out in inner
         ] or [(halves, list(runs))]
         errors: dict[HankelDMDc, list[float]] = {each: [] for each in (*every, *varying)}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SeakeepWarning)
+        with quiet():
             for (training, judged), each in itertools.product(folds, errors):
                 model = each._fitted(dict(training), states, inputs, ())
                 for name in judged:

@@ -49,7 +49,6 @@ CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     samples.units,
     clocks.rates,
     clocks.steps,
-    clocks.periods,
 ]
 """All checks, in the order in which findings are listed."""
 

@@ -8,7 +8,7 @@ from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Findings, Kind, Record, sound, step_of
 from seakeep.signals.filters import PASSBAND
-from seakeep.signals.synchronisation import ASSUMED
+from seakeep.signals.time_axis import ASSUMED
 from seakeep.signals.waves import energy_above
 
 RATE_TOLERANCE = 0.01
@@ -131,7 +131,7 @@ def rates(record: Record) -> Findings:
         table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
             yield record.finding(ClocksKind.COUNTED, label, table=table)
-        if rate and rate.counted and rate.assumed:
+        if rate and rate.assumed:
             yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 
 
@@ -179,12 +179,6 @@ def steps(record: Record) -> Findings:
                 yield record.finding(
                     kind, name, 1 / dt, cut, "Hz", share=100 * share, period=period, fate=fate
                 )
-
-
-def periods(record: Record) -> Findings:
-    """A counted period that is not a period of the waves."""
-    if record.period and record.wave_channel:
-        yield record.finding(ClocksKind.PERIOD, record.wave_channel, *record.period, "s")
 
 
 def others(record: Record) -> Findings:

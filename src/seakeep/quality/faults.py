@@ -108,7 +108,7 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
     Raises
     ------
     DataError
-        If the series has gaps or is shorter than a window.
+        If the series has gaps or fewer than sixteen samples.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
     >>> np.flatnonzero(find_outliers(x))
     array([100, 101, 102])
     """
-    x = as_series(series, minimum=2 * REACH + 1)
+    x = as_series(series, minimum=2 * REACH)
     middle, spread = _spread(x[_starts(x)])
     # A point reflection continues slopes, and two sides that are averaged cancel them.
     views = np.lib.stride_tricks.sliding_window_view(odd_extension(x, REACH), BESIDE)
@@ -331,8 +331,6 @@ def reading_step(series: npt.ArrayLike) -> float:
     """
     x = as_series(series)
     change = np.diff(x)
-    if x.size < 3 or not change.any():
-        return np.nan
     frame = _frame(x)
     steps = []
     for begin, end in stretches(change == 0):  # x[begin] to x[end] are equal

@@ -171,10 +171,9 @@ Redundant = Mapping[tuple[str, ...], float | None]
 
 @dataclass(frozen=True)
 class Rate:
-    """Stated rate of a logger (Hz): whether times are counted with it, whether it is a guess."""
+    """Stated rate of a logger (Hz), and whether it is a guess with which times are counted."""
 
     stated: float
-    counted: bool = True
     assumed: bool = False
 
 
@@ -199,10 +198,6 @@ class Record:
         "regular", "irregular" or None.
     water_depth : float, optional
         m.
-    wave_channel : str, optional
-        Channel on which the encounter period is counted.
-    period : (float, float), optional
-        Counted period and energy period of the spectrum, s, where they disagree.
     stated_period : float, optional
         Encounter period that the campaign states, s.
     redundant : mapping of tuple of str to float, optional
@@ -228,8 +223,6 @@ class Record:
     span: tuple[float, float] = (-np.inf, np.inf)
     waves: str | None = None
     water_depth: float | None = None
-    wave_channel: str | None = None
-    period: tuple[float, float] | None = None
     stated_period: float | None = None
     redundant: Redundant = field(default_factory=dict)
     rates: Mapping[str, Rate] = field(default_factory=dict)

@@ -19,7 +19,7 @@ from seakeep.report.figures.histories import quality_figure
 from seakeep.report.page import Section, drawing, inline_picture, rendered, section
 from seakeep.report.style import figure_style, shown_unit
 from seakeep.report.tables import MISSING, Number, number, short, table
-from seakeep.signals.synchronisation import ASSUMED, Clock
+from seakeep.signals.time_axis import ASSUMED, Clock
 
 SHEET = "data-quality sheet"
 """Kind of the files of a sheet, which sets them apart from the user's."""

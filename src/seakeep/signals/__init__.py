@@ -38,13 +38,19 @@ from seakeep.signals.rigid_body import (
     transfer_velocity,
 )
 from seakeep.signals.synchronisation import (
-    Clock,
     clock_from_correlation,
     clock_from_pulses,
     clock_from_shared,
     pool_drift,
 )
-from seakeep.signals.time_axis import TimeReport, bridge, inspect_times, onto_uniform, uniform_step
+from seakeep.signals.time_axis import (
+    Clock,
+    TimeReport,
+    bridge,
+    inspect_times,
+    onto_uniform,
+    uniform_step,
+)
 from seakeep.signals.tracking import Track, contact_sheet, track_video
 from seakeep.signals.waves import (
     encounter_period,

@@ -1,26 +1,25 @@
 r"""Clocks of loggers against one another: offset and drift, with their uncertainty.
 
-A clock reads :math:`c(t) = \text{offset} + (1 + \text{drift})\,t` at the reference time t. It is
-found from pulses that both loggers record, from a signal that both record, or from the lag
-between two related signals, window by window.
+A :class:`Clock` is found from pulses that both loggers record, from a signal that both record, or
+from the lag between two related signals, window by window.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 from scipy.interpolate import CubicSpline
 
-from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_real
+from seakeep.arrays import ArrayLike, FloatArray, IntArray
 from seakeep.core.spectra import autocorrelation
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import low_pass
 from seakeep.signals.lags import windowed_lags
-from seakeep.signals.time_axis import record, stretches, uniform_step, usual_step
+from seakeep.signals.time_axis import Clock, record, stretches, uniform_step, usual_step
 from seakeep.signals.waves import noise_level, tapered_power
 
 LARGEST_DRIFT = 1e-3
@@ -29,79 +28,6 @@ LARGEST_DRIFT = 1e-3
 SIGNAL, ABOVE = 0.99, 20.0
 """Part of the squared slope of a signal, which tells instants, that is compared where two loggers
 record it, and the power over that of its noise from which on it counts."""
-
-ASSUMED = "assumed the same as the reference's"
-"""Method of a clock of which nothing is known."""
-
-
-@dataclass(frozen=True)
-class Clock:
-    """A logger's clock against the reference, and how well it is known.
-
-    Parameters
-    ----------
-    offset : float
-        What the clock reads at reference time 0, s.
-    drift : float
-        How much faster than the reference it runs, a pure number (25e-6 is 25 ppm).
-    offset_error, drift_error : float
-        Standard errors of the two; NaN where the data do not determine them.
-    method : str
-        How it was found.
-    count : int
-        Pulses, windows or samples that it rests on.
-    residual : float
-        RMS of what a straight line of clock over clock leaves, s.
-    modulus : float
-        The offset is known only up to multiples of this (s): a train of equal pulses fits again
-        after each period. ``inf`` where it is unique.
-    centre : float
-        Reference time at which the errors of reading and drift are independent, s.
-
-    Examples
-    --------
-    >>> clock = Clock(offset=0.37, drift=25e-6)
-    >>> float(clock.reference(clock.reading(100.0)))
-    100.0
-    """
-
-    offset: float = 0.0
-    drift: float = 0.0
-    offset_error: float = 0.0
-    drift_error: float = 0.0
-    method: str = "the same clock"
-    count: int = 0
-    residual: float = 0.0
-    modulus: float = np.inf
-    centre: float = 0.0
-
-    def reference(self, readings: ArrayLike) -> FloatArray:
-        """Reference time of readings of this clock, s."""
-        return (as_real(readings, "the readings") - self.offset) / (1.0 + self.drift)
-
-    def reading(self, time: ArrayLike) -> FloatArray:
-        """What this clock reads at reference times, s."""
-        return self.offset + (1.0 + self.drift) * as_real(time, "the times")
-
-    @property
-    def known(self) -> bool:
-        """Whether offset and drift were found or stated; else they are zero because none was."""
-        return self.method not in (Clock.method, ASSUMED)
-
-    def describe(self) -> str:
-        """One line for people: offset and drift with their errors, and where they come from."""
-        if not self.known:
-            return self.method
-        offset, drift = f"{1e3 * self.offset:+z.2f}", f"{1e6 * self.drift:+z.1f}"
-        if np.isfinite(self.drift_error):
-            offset += f" ± {1e3 * self.offset_error:.2f}"
-            drift += f" ± {1e6 * self.drift_error:.1f}"
-        return f"{offset} ms, {drift} ppm ({self.method}, n = {self.count})"
-
-    def with_drift(self, drift: float, why: str) -> Clock:
-        """Clock of another drift, which reads the same in the middle of what this rests on."""
-        offset = self.offset + (self.drift - drift) * self.centre
-        return replace(self, offset=offset, drift=drift, method=f"{self.method}, {why}")
 
 
 def _line(own: FloatArray, reference: FloatArray, errors: FloatArray, method: str) -> Clock:

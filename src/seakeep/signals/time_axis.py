@@ -1,7 +1,12 @@
-"""Time axes: order, step, gaps and jitter; gaps bridged where that is asked for."""
+r"""Time axes: order, step, gaps and jitter; gaps bridged where that is asked for.
+
+A logger's clock reads :math:`c(t) = \text{offset} + (1 + \text{drift})\,t` at the reference time t.
+"""
+
+from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -30,6 +35,80 @@ def instant_text(instant: float, dt: float) -> str:
 def span_text(begin: float, end: float, dt: float) -> str:
     """Write a span of time, with its unit; instants as :func:`instant_text`."""
     return f"{instant_text(begin, dt)} to {instant_text(end, dt)} s"
+
+
+ASSUMED = "assumed the same as the reference's"
+"""Method of a clock of which nothing is known."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A logger's clock against the reference, and how well it is known.
+
+    Parameters
+    ----------
+    offset : float
+        What the clock reads at reference time 0, s.
+    drift : float
+        How much faster than the reference it runs, a pure number (25e-6 is 25 ppm).
+    offset_error, drift_error : float
+        Standard errors of the two; NaN where the data do not determine them.
+    method : str
+        How it was found.
+    count : int
+        Pulses, windows or samples that it rests on.
+    residual : float
+        RMS of what a straight line of clock over clock leaves, s.
+    modulus : float
+        The offset is known only up to multiples of this (s): a train of equal pulses fits again
+        after each period. ``inf`` where it is unique.
+    centre : float
+        Reference time at which the errors of reading and drift are independent, s.
+
+    Examples
+    --------
+    >>> clock = Clock(offset=0.37, drift=25e-6)
+    >>> float(clock.reference(clock.reading(100.0)))
+    100.0
+    """
+
+    offset: float = 0.0
+    drift: float = 0.0
+    offset_error: float = 0.0
+    drift_error: float = 0.0
+    method: str = "the same clock"
+    count: int = 0
+    residual: float = 0.0
+    modulus: float = np.inf
+    centre: float = 0.0
+
+    def reference(self, readings: ArrayLike) -> FloatArray:
+        """Reference time of readings of this clock, s."""
+        return (as_real(readings, "the readings") - self.offset) / (1.0 + self.drift)
+
+    def reading(self, time: ArrayLike) -> FloatArray:
+        """What this clock reads at reference times, s."""
+        return self.offset + (1.0 + self.drift) * as_real(time, "the times")
+
+    @property
+    def known(self) -> bool:
+        """Whether offset and drift were found or stated; else they are zero because none was."""
+        return self.method not in (Clock.method, ASSUMED)
+
+    def describe(self) -> str:
+        """One line for people: offset and drift with their errors, and where they come from."""
+        if not self.known:
+            return self.method
+        offset, drift = f"{1e3 * self.offset:+z.2f}", f"{1e6 * self.drift:+z.1f}"
+        if np.isfinite(self.drift_error):
+            offset += f" ± {1e3 * self.offset_error:.2f}"
+            drift += f" ± {1e6 * self.drift_error:.1f}"
+        return f"{offset} ms, {drift} ppm ({self.method}, n = {self.count})"
+
+    def with_drift(self, drift: float, why: str) -> Clock:
+        """Clock of another drift, which reads the same in the middle of what this rests on."""
+        offset = self.offset + (self.drift - drift) * self.centre
+        return replace(self, offset=offset, drift=drift, method=f"{self.method}, {why}")
 
 
 def check_order(time: ArrayLike, name: str = "the run") -> FloatArray:
@@ -143,17 +222,18 @@ def _tolerance(t: FloatArray, step: float) -> float:
 
 def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
-    usual = np.median(steps)
-    counts = steps / usual
-    gaps = np.flatnonzero(counts > 1.5)
-    if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
+    place, step, _ = _grid(t)
+    counts = np.diff(place)
+    gaps = np.flatnonzero(counts > 1)
+    if gaps.size and np.max(np.abs(steps / step - counts)) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
             f"the times of {name} have {gaps.size} gap(s): after t = {_shown(t, gaps[0])}, "
-            f"{np.rint(counts[gaps[0]]) - 1:.0f} sample(s) of {usual:g} s are missing; the "
+            f"{counts[gaps[0]] - 1} sample(s) of {step:g} s are missing; the "
             f"longest gap, after t = {_shown(t, longest)}, lasts {steps[longest]:g} s. Fill the "
             "gap, or use the record before or after it."
         )
+    usual = np.median(steps)
     at = np.argmax(np.abs(steps - usual))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
@@ -236,14 +316,11 @@ def inspect_times(time: ArrayLike, name: str = "the run") -> TimeReport:
 
 def _grid(t: FloatArray) -> tuple[IntArray, float, float]:
     """Whole number of steps from the first instant to each, the step, and the grid's start."""
-    usual = usual_step(t)
-    place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(np.diff(t) / usual), 1))])
-    for _ in range(2):  # a usual step that is off by rounding adds up over a long gap
-        step, begin = np.polyfit(place, t, 1)
-        again = np.rint((t - begin) / step)
-        if np.array_equal(again, place) or np.any(np.diff(again) < 1):
-            break
-        place = again - again[0]
+    steps = np.diff(t)
+    # Rounding of the times averages out; in one step it would add up over a long gap.
+    usual = steps[steps < 1.5 * np.median(steps)].mean()
+    place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / usual), 1))])
+    step, begin = np.polyfit(place, t, 1)
     return place.astype(np.int64), float(step), float(begin)
 
 
@@ -328,8 +405,8 @@ def over_gaps(series: FloatArray, there: BoolArray | None = None) -> FloatArray:
     """
     there = np.isfinite(series) if there is None else there
     at = np.flatnonzero(there)
-    if at.size in (0, series.size):
-        return np.where(there, series, 0.0)
+    if not at.size:
+        return np.zeros(series.size)
     return np.interp(np.arange(series.size), at, series[at])
 
 

@@ -23,7 +23,7 @@ import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.errors import DataError, RequestError, warn
-from seakeep.files import existing_file
+from seakeep.files import reading
 from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import (
     CORNERS,
@@ -147,9 +147,10 @@ class _Video:
 @contextmanager
 def _open_video(path: Path | str) -> Iterator[_Video]:
     """Open a video that OpenCV reads, such as MP4, AVI or MOV."""
-    cv2, path = opencv(), existing_file(path)
-    if path.stat().st_size == 0:
-        raise DataError(f"{path} is empty (0 bytes). Copy the video again.")
+    cv2 = opencv()
+    with reading(path) as path:
+        if path.stat().st_size == 0:
+            raise DataError(f"{path} is empty (0 bytes). Copy the video again.")
     capture = cv2.VideoCapture(str(path))
     try:
         if not capture.isOpened():

@@ -79,7 +79,7 @@ class Comparison:
     @property
     def complete(self) -> bool:
         """Whether there is a forecast at all instants: members that were lost are left out."""
-        return not any(bool(each.isnull().any()) for each in self.forecast.data_vars.values())
+        return not self.forecast.isnull().to_dataarray().any()
 
     @property
     def full_scale(self) -> float | None:
@@ -266,11 +266,7 @@ def compare_models(
         for name, run in prepared.items():
             time = run["time"].values
             at, last = samples_in(run, used, whole_span(run, "test"), dt, history, lead, first)
-            window: Any = (
-                run,
-                float(time[at]) if first is None else first,
-                count or max(last - at, 1),
-            )
+            window: Any = run, float(time[at]), count or max(last - at, 1)
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
                 how: Any = {"level": level, "band": band, "executor": executor, "progress": tell}
@@ -320,7 +316,7 @@ def _judged(model: Model, run: xr.Dataset, name: str, forecast: xr.Dataset) -> C
     """Pair a forecast with what was measured at its instants."""
     end = run["time"].values[-1]
     # The last instant may lie a step beyond the record: the input before it is known.
-    inside = forecast[model.states].sel(time=slice(None, end)).assign_attrs(forecast.attrs)
+    inside = forecast[model.states].sel(time=slice(None, end))
     if (known := inside.sizes["time"]) < FEWEST_SAMPLES:
         raise RequestError(
             f"the forecast of {name} from {forecast.attrs['start']:g} s has {known} measured "
@@ -576,7 +572,7 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         raise RequestError("the run is at full scale already; convert it once.")
 
     def factor_of(unit: str) -> tuple[float, str]:
-        return froude_factor(unit or "1", scale, density_ratio), unit
+        return froude_factor(unit, scale, density_ratio), unit
 
     out = _scaled(run, factor_of)
     for name in {"time", "diverged_at"} & set(run.coords):
@@ -619,15 +615,12 @@ def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> x
     """Multiply channels, and the uncertainties among their attributes, by their factors."""
     out = run.copy()
     for name, channel in run.data_vars.items():
-        unit = str(channel.attrs.get("units", ""))
-        factor, shown = factor_of(unit)
+        factor, shown = factor_of(str(channel.attrs.get("units", "")))
         if factor == 1.0 or channel.dtype.kind not in "fiu":
             continue
         known = {"training_std", "noise_std", "accuracy"} & set(channel.attrs)
         spreads = {key: factor * float(channel.attrs[key]) for key in known}
-        out[name] = (channel * factor).assign_attrs(
-            channel.attrs | spreads | ({"units": shown} if unit else {})
-        )
+        out[name] = (channel * factor).assign_attrs(channel.attrs | spreads, units=shown)
     return out
 
 

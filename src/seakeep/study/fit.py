@@ -246,9 +246,11 @@ def fit_baselines(
     runs = training_runs(prepared)
     period, dt = campaign.encounter_period(), step_of(runs)
     models: dict[str, Model] = {}
-    for kind in (kind for kind, each in KINDS.items() if each.role == "reference"):
-        recommended = getattr(KINDS[kind], "recommended", None)
-        spec: Any = KINDS[kind]() if recommended is None else recommended(period, dt)
+    for kind, each in KINDS.items():
+        if each.role != "reference":
+            continue
+        recommended = getattr(each, "recommended", None)
+        spec: Any = each() if recommended is None else recommended(period, dt)
         try:
             if beside is not None:
                 spec = replace(spec, **_input_map(spec, beside.settings))

@@ -23,7 +23,7 @@ from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.density import jsd_intervals
 from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
-from seakeep.errors import DataError, SeakeepError, SeakeepWarning, warn
+from seakeep.errors import DataError, SeakeepError, quiet, warn
 from seakeep.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -102,11 +102,11 @@ def judge(
             "differences": difference_table(test, groups["training"], rng),
             **band_tables(test, groups.get("calibration"), settings.statistics.level),
             "trend": trend_table(test, groups["training"], random_stream(seed, f"trend.{name}")),
-            "response": regular_response(groups, name) if is_regular(groups, name) else None,
         }
+        if is_regular(groups, name):
+            of_test["response"] = regular_response(groups, name)
         for key, each in of_test.items():
-            if each is not None:
-                tables[key][name] = each
+            tables[key][name] = each
     out = {
         key: xr.concat(list(of.values()), xr.Variable("test", list(of)), join="outer")
         for key, of in tables.items()
@@ -480,9 +480,7 @@ def _channel_densities(
     channel, forecasts, measured = item
     variants = {}
     try:
-        with warnings.catch_warnings():
-            # Caps of the block length and coarse grids: the table prints the length.
-            warnings.simplefilter("ignore", SeakeepWarning)
+        with quiet():  # the table prints the block length
             for variant, choice in VARIANTS.items():
                 variants[variant] = jsd_intervals(
                     forecasts,

@@ -141,10 +141,8 @@ def choose_training(
             f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
             "role = 'train' or a span train = [start, end], or use scheme = 'leave_out'."
         )
-    spans = {
-        name: _samples(run, whole_span(run) if groups else run.attrs["train_span"])
-        for name, run in ((name, runs[name]) for name in names)
-    }
+    uses = () if groups else ("train",)
+    spans = {name: _samples(runs[name], whole_span(runs[name], *uses)) for name in names}
     longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
     needed = training_samples(needs)
     for name in [longest] if training.scheme == "halves" else names:
@@ -276,14 +274,12 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     0.5
     """
     shares = []
-    for i, (run, begin, end) in enumerate(spans):
+    for run, begin, end in spans:
         middle = begin + (end - begin) * (np.arange(200) + 0.5) / 200
-        covers = sum(
-            (first <= middle) & (middle <= last)
-            for k, (other, first, last) in enumerate(spans)
-            if k != i and other == run
-        )
-        shares.append(np.mean(covers > 0))
+        covers = [
+            (first <= middle) & (middle <= last) for other, first, last in spans if other == run
+        ]
+        shares.append(np.mean(np.sum(covers, axis=0) > 1))  # its own is one of them
     return float(np.mean(shares)) if shares else 0.0
 
 
@@ -372,8 +368,9 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
     general = settings.study
     training_names = list(settings.training.runs) or campaign.training_runs
     testing = {name: _test_runs(study, name) for name in settings.tests}
-    wanted = dict.fromkeys([*training_names, *(n for names in testing.values() for n in names)])
-    runs = load_prepared(campaign, names=list(wanted), progress=progress)
+    asked = dict.fromkeys(run for names in testing.values() for run in names)
+    wanted = list(dict.fromkeys(training_names) | asked)
+    runs = load_prepared(campaign, names=wanted, progress=progress)
     for name, run in runs.items():
         _check_channels(name, run, [*study.states, *study.inputs])
     shared, dt = next(iter(runs.values())).attrs, step_of(runs)
@@ -416,12 +413,11 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
                     f"tests.{name}: no model may be tested on the run '{window.run}', because all "
                     "learn from it. Leave it out of training.runs, or name other runs."
                 )
-    asked = {run for names in testing.values() for run in names}
     tested = {window.run for windows in tests.values() for window in windows}
     untested = [
         each.name
         for each in training
-        if asked.intersection(each.left_out) and not any(map(each.may_test, tested))
+        if asked.keys() & each.left_out and not any(map(each.may_test, tested))
     ]
     if untested:
         warn(

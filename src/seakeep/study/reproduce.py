@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -140,7 +140,6 @@ def reproduce(
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    finished: Callable[[StudyResult], None] | None = None,
 ) -> dict[str, StudyResult]:
     """Play the virtual campaign and run the paper's study on it, in three acts.
 
@@ -159,8 +158,6 @@ def reproduce(
         As in :func:`seakeep.study.run_study`.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
-    finished : callable, optional
-        Called with the result of each act once it is known, before it is written.
 
     Returns
     -------
@@ -199,7 +196,6 @@ def reproduce(
             progress=named(progress, f"{act.title}: "),
             extra={"nominal": nominal},
             notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
-            finished=finished,
         )
     return results
 

@@ -4,7 +4,6 @@ One rule, key by key, for campaigns and studies: what the table states, else wha
 else the default of the kind.
 """
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal
@@ -12,7 +11,7 @@ from typing import Any, Literal
 from seakeep.arrays import check_keys
 from seakeep.campaign import ModelSettings
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
+from seakeep.errors import RequestError, did_you_mean, quiet
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.observables import SlowSquares, counted_in, observables_of
 from seakeep.models.settings import Folds
@@ -194,8 +193,7 @@ def mistakes_of(
     preset : str, optional
         Preset of the study.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)  # given when the model is fitted
+    with quiet():  # given when the model is fitted
         try:
             resolve_model(settings, 1.0, 1.0 / 32, preset=preset)  # any period and step
         except RequestError as error:

@@ -9,7 +9,7 @@ puts those of all units side by side, along models and training sets.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -22,11 +22,11 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
+from seakeep.campaign import read_table
 from seakeep.core import metrics
 from seakeep.core.calibration import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
-from seakeep.formats.columns import decoding
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
@@ -70,7 +70,6 @@ def run_study(
     progress: Progress | None = None,
     extra: Datasets | None = None,
     notes: Mapping[str, str] | None = None,
-    finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Run a study, or continue one that was stopped.
 
@@ -90,8 +89,6 @@ def run_study(
         Groups to be kept beside the results.
     notes : mapping of str to str, optional
         Attributes to be kept beside them, such as ``preparation_note`` for the report.
-    finished : callable, optional
-        Called with the result once it is known, just before it is written.
 
     Returns
     -------
@@ -141,8 +138,6 @@ def run_study(
                 warn(words_of_lost(groups["statistics/lost"]))
             attributes = {**labels, **_attributes(study, plan), **(notes or {})}
             result = StudyResult(out, attributes, {**groups, **(extra or {})})
-        if finished is not None:
-            finished(result)
         if before is None or before.attrs != result.attrs:
             write_result(result)
         folder.clear()
@@ -191,7 +186,7 @@ def _computed(
     known = {unit: folder.read(unit.name) for unit in units}
     done = {unit: groups for unit, groups in known.items() if groups is not None}
     tasks = tasks_of(plan, [unit for unit in units if unit not in done])
-    members = sum(each.spec.n_members for each in plan.models.values())
+    members = sum(spec.n_members for spec in plan.specs.values())
     steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
     mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
     taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
@@ -419,22 +414,19 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
     if training.left_out or len(training.runs) > 1:
         spec: Any = plan.specs[unit.model].from_json(fitted.origin)
         groups = [each.left_out for each in plan.training if each is not training and each.left_out]
-        cases = []
+        tests: Groups = {}
+        ensembles: dict[str, Any] = {}
         for group in groups or [(run,) for run in training.runs]:
             rest = [span for span in training.spans if span[0] not in group]
-            tests = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
-            if rest and tests:
-                cases.append((spec.fit(*plan.taught(rest)), tests))
+            others = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
+            if rest and others:
+                tests |= others
+                ensembles |= dict.fromkeys(others, spec.fit(*plan.taught(rest)))
     else:
         spans = [(name, *plan.runs[name].attrs["train_span"]) for name in plan.calibrated_on]
-        cases = [(fitted, parts_of(plan.runs, spans))]
-    judged = [
-        each
-        for ensemble, tests in cases
-        for each in held_out(
-            dict.fromkeys(tests, ensemble), tests, steps, statistics.level
-        ).values()
-    ]
+        tests = parts_of(plan.runs, spans)
+        ensembles = dict.fromkeys(tests, fitted)
+    judged = list(held_out(ensembles, tests, steps, statistics.level).values())
     nothing = np.full(len(plan.states), np.nan)
     unknown = ConformalMargin(nothing, nothing, nothing, nothing, statistics.level)
     learnt: Any = unknown, nothing, [nothing] * 4
@@ -554,17 +546,13 @@ def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
 
 def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
     """True states at the instants of a run; NaN of a channel that has no truth."""
-    import h5py
-
     path = folder / f"{run}.nc"
     if not path.exists():
         raise DataError(
             f"the study names the folder {folder} of true channels, and {path.name} is not in "
             "it. Play the tank again, or leave study.truth out."
         )
-    with decoding(path, "true channels", "Play the tank again."), h5py.File(path) as file:
-        true = {name: file[name][:] for name in ("time", *plan.states) if name in file}
-    time = plan.runs[run]["time"].values
+    time, true = plan.runs[run]["time"].values, read_table(path)
     nothing = np.full(time.size, np.nan)
     columns = [
         np.interp(time, true["time"], true[name]) if name in true else nothing

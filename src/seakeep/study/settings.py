@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -207,7 +208,7 @@ class StudySettings(Table):
             )
         for group in (self.models, self.tests):
             for name in group:
-                if not name.replace("_", "").replace("-", "").isalnum() or not name.isascii():
+                if not re.fullmatch(r"[\w-]+", name, re.ASCII):
                     raise ValueError(
                         f"the name {name!r} is made of more than letters, digits, '_' and '-', "
                         "and files are named after it; rename it"
@@ -241,16 +242,20 @@ class Study:
         return self.settings.study.name or self.campaign.name
 
     @property
+    def _channels(self) -> GeneralStudySettings | ModelSettings:
+        """What states the channels: the study, or else a model of the campaign."""
+        stated = self.settings.study
+        return stated if stated.states else self.campaign.model(stated.model)
+
+    @property
     def states(self) -> tuple[str, ...]:
         """Channels that the models forecast."""
-        stated = self.settings.study.states
-        return stated or self.campaign.model(self.settings.study.model).states
+        return self._channels.states
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Channels that drive the models."""
-        stated = self.settings.study
-        return stated.inputs if stated.states else self.campaign.model(stated.model).inputs
+        return self._channels.inputs
 
     @property
     def truth_folder(self) -> Path | None:
@@ -261,12 +266,14 @@ class Study:
     @property
     def digest(self) -> str:
         """SHA-256 of what the results depend on: settings, campaign, raw files, the truth."""
-        content = self.settings.model_dump(mode="json")
-        for key in ("name", "description", "campaign", "truth", "model"):
-            del content["study"][key]
-        for each in content["tests"].values():
-            del each["label"]
-        del content["output"]["paper"]
+        content = self.settings.model_dump(
+            mode="json",
+            exclude={
+                "study": {"name", "description", "campaign", "truth", "model"},
+                "tests": {"__all__": {"label"}},
+                "output": {"paper"},
+            },
+        )
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}

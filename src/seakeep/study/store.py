@@ -95,18 +95,14 @@ class UnitFolder:
             units.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=units).close()
         started = _read_header(header) if header.exists() else None
-        is_finished = (self.folder / RESULT).exists()
-        if started is not None and (is_finished or any(units.glob("*.nc"))):
-            self._check_header(started)
-        elif not is_finished:
+        if not ((self.folder / RESULT).exists() or any(units.glob("*.nc"))):
             check_report(self.folder)
-            if started is None and any(units.iterdir()):
-                raise RequestError(
-                    f"{units} holds files, and {header} does not say of which study. "
-                    "Choose another folder (-o), or remove this one."
-                )
-
-    def _check_header(self, started: Mapping[str, Any]) -> None:
+            return
+        if started is None:
+            raise RequestError(
+                f"{self.folder} holds results, and {header} does not say of which study. "
+                "Choose another folder (-o), or remove this one."
+            )
         if started["digest"] != self.digest:
             raise RequestError(
                 f"{self.folder} holds the results of another study: its digest starts with "

@@ -18,6 +18,7 @@ import numpy as np
 from seakeep.arrays import ArrayLike, ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError, needing
 from seakeep.tank.hydrodynamics import (
+    RIGID,
     Hydrodynamics,
     Kernel,
     excitation_at,
@@ -97,7 +98,7 @@ class Rig:
     def flow(self) -> FloatArray:
         """Flows that lose energy per velocity: of each motion and out of the pool's opening."""
         through = np.zeros(len(self.names))
-        if self.hydro.pool:
+        if through.size > len(RIGID):
             through[1:4] = -1.0, self.pool[0], 1.0
         return np.vstack([np.eye(len(self.names)), through])
 
@@ -202,12 +203,13 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
         for each in (vessel.linear_damping, vessel.quadratic_damping)
     )
     flow = np.zeros(3)
-    if opening := coefficients.pool:
+    if len(coefficients.names) > len(RIGID):
         linear += [0.0, losses.slosh_linear]
         quadratic += [0.0, losses.slosh_quadratic]
-        contraction = (opening.area / opening.opening) ** 2
-        quadratic_loss = 0.5 * coefficients.attrs["density"] * losses.loss_coefficient * contraction
-        flow[:] = opening.centre, quadratic_loss * opening.area, losses.piston_linear
+        hull = coefficients.attrs
+        contraction = (hull["pool_area"] / hull["pool_opening"]) ** 2
+        quadratic_loss = 0.5 * hull["density"] * losses.loss_coefficient * contraction
+        flow[:] = hull["pool_centre"], quadratic_loss * hull["pool_area"], losses.piston_linear
     step = settings.simulation.step
     height = coefficients.attrs["centre_of_gravity"]
     rig = Rig(

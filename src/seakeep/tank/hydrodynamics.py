@@ -37,15 +37,6 @@ KERNEL_LENGTH = 12.0  # s
 
 
 @dataclass(frozen=True)
-class Pool:
-    """Moon pool: centre (m), area of its free surface and of its opening (m²)."""
-
-    centre: float
-    area: float
-    opening: float
-
-
-@dataclass(frozen=True)
 class Hydrodynamics:
     """Frequency-domain coefficients of a hull, as the solver gave them.
 
@@ -64,7 +55,6 @@ class Hydrodynamics:
     mass: FloatArray
     stiffness: FloatArray
     far_field: ComplexArray
-    pool: Pool | None
     attrs: dict[str, Any]
 
 
@@ -120,15 +110,11 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
             f"{', '.join(RIGID)}, with piston and slosh after them for a hull with a moon pool."
         )
     force, far_field = data["excitation"].values, data["far_field"].values.astype(float)
-    pool = None
-    if "piston" in names:
-        pool = Pool(*(data.attrs[f"pool_{key}"] for key in ("centre", "area", "opening")))
     as_stored = ("omega", "added_mass", "damping", "mass", "stiffness")
     return Hydrodynamics(
         names=names,
         excitation=force[0] + 1j * force[1],
         far_field=far_field[:, 0] + 1j * far_field[:, 1],
-        pool=pool,
         attrs=dict(data.attrs),
         **{key: data[key].values for key in as_stored},
     )
@@ -157,9 +143,8 @@ def passive_damping(hydro: Hydrodynamics) -> tuple[FloatArray, FloatArray]:
     )
     tail = np.where(omega > last, (last / np.maximum(omega, last)) ** 3, 1.0)
     weight = np.ones((omega.size, len(hydro.names)))
-    if hydro.pool:
-        low, high = POOL_TAPER
-        weight[:, 3:] -= rising((omega - low) / (high - low))[:, None]
+    low, high = POOL_TAPER
+    weight[:, len(RIGID) :] -= rising((omega - low) / (high - low))[:, None]
     # A congruence keeps the matrices passive.
     tapered = weight[:, :, None] * inside * tail[:, None, None] * weight[:, None, :]
     return omega, _passive(tapered)
