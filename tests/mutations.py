@@ -240,8 +240,8 @@ CHANGES = {
     ],
     "hosts/templates/estimator.c": [
         ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
-        ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
-        ("row[k] += last[c] * on_states[c * M + k];", "row[k] += 0.0;", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
+        ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
+        ("row[k] += last[c] * on_states[c * M + k];", "row[k] += 0.0;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
     ],
     "metrics.py": [
         ("own = [_block(p, m) for p, m, _ in cases]", "own = [max(_block(p, m) for p, m, _ in cases)] * len(cases)", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
@@ -323,7 +323,7 @@ CHANGES = {
         ("self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
         ("middle.var(axis=0, ddof=1)", "middle.var(axis=0, ddof=0)", "models/test_live.py::test_members_that_are_held_give_the_mean_of_the_ensemble"),
         ("np.mean(apart**2, axis=0), axis=-2)[..., late:, :]", "np.mean(apart**2, axis=0)[..., late:, :], axis=-2)", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
-        ("apart = 0.5 * np.abs(plus - minus)", "apart = np.abs(plus - minus)", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
+        ("apart = 0.5 * np.abs(plus - minus)", "apart = np.abs(plus - minus)", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("(0.5 * (plus + minus) - middle[:, None])", "(0.0 * (plus + minus - middle[:, None]))", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("np.maximum(away.min(axis=0), -away.max(axis=0))", "away.min(axis=0)", "models/test_ahead.py::test_a_sea_that_departs_from_training_is_forecast_on"),
         ("np.fmin(np.abs(mean - centre), before)", "np.abs(mean - centre)", "models/test_ahead.py::test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises"),

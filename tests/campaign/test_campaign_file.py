@@ -5,7 +5,6 @@ from small_tank import CAMPAIGN
 
 from seakeep.campaign import read_campaign
 from seakeep.errors import RequestError
-from seakeep.toml import Length
 
 
 def refusal(path):
@@ -194,23 +193,12 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message
 
 
-def test_a_free_name_with_a_step_knows_its_unit(changed):
-    assert changed(("[derived.pitch_rate]", "[derived.slope]"))
-
-
 def test_a_derived_rate_of_an_elevation(changed):
     """It was refused: m/s against m."""
     rate = '[derived.eta_fwd_rate]\nfrom = "eta_fwd"\nstep = "differentiate"\n[runs.first]'
     campaign = changed(("[runs.first]", rate))
     assert campaign.prepare(["first"])["first"]["eta_fwd_rate"].attrs["units"] == "m/s"
     assert campaign.period_channel() == "eta_fwd"
-
-
-def test_a_model_is_of_any_kind_with_keys_of_its_constructor(changed):
-    model = changed(("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n')).model()
-    assert model.kind == "fir"
-    assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
-                                 "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
 
 
 def test_named_models_are_found_by_their_names(changed):

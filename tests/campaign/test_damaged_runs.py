@@ -29,41 +29,31 @@ def damage(tank, how):
 
 
 @pytest.mark.parametrize("how", ["cut", "empty", "noise", "missing"])
-class TestPeriod:
-    def test_another_run_is_prepared_with_the_period_of_those_that_can_be_read(
-        self, changed, tank, how
-    ):
-        campaign = changed(POOLED)
-        both = campaign.encounter_period()
-        damage(tank, how)
-        with pytest.warns(SeakeepWarning, match=NOTE):
-            run = campaign.prepare(["first"])["first"]
-        alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
-        assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
-        assert abs(alone / both - 1) > 1e-3
-        told = [each for each in findings_of(run) if each.kind.word == "left out"]
-        assert [each.channel for each in told] == ["run second"]
-        assert "run 'second' is left out of the encounter period" in told[0].text
-
-    def test_all_asked_for_the_others_are_kept_and_the_bad_file_is_named(self, changed, tank, how):
-        campaign = changed(POOLED)
-        damage(tank, how)
-        refused = RequestError if how == "missing" else DataError
-        for work in (write_prepared, load_prepared):
-            with pytest.raises(refused, match=r"second\.csv"):
-                work(campaign)
-        kept = tank / "prepared" / "first.nc"
-        written = kept.stat().st_mtime_ns
-        # Fresh as long as the damage is the same; prepared anew once the file is mended.
-        with pytest.raises((RequestError, DataError)):
-            write_prepared(campaign)
-        assert kept.stat().st_mtime_ns == written
-        write_csv(tank / "second.csv", tank_columns(1))
-        write_prepared(campaign)
-        assert kept.stat().st_mtime_ns > written
-        assert not [
-            e for e in findings_of(load_prepared(campaign)["first"]) if e.kind.word == "left out"
-        ]
+def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, tank, how):
+    campaign = changed(POOLED)
+    both = campaign.encounter_period()
+    damage(tank, how)
+    with pytest.warns(SeakeepWarning, match=NOTE):
+        run = campaign.prepare(["first"])["first"]
+    alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
+    assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
+    assert abs(alone / both - 1) > 1e-3
+    told = [each for each in findings_of(run) if each.kind.word == "left out"]
+    assert [each.channel for each in told] == ["run second"]
+    assert "run 'second' is left out of the encounter period" in told[0].text
+    refused, kept = RequestError if how == "missing" else DataError, tank / "prepared/first.nc"
+    written = []
+    # The others are kept, fresh as long as the damage is the same.
+    for work in (write_prepared, load_prepared, write_prepared):
+        with pytest.raises(refused, match=r"second\.csv"):
+            work(campaign)
+        written.append(kept.stat().st_mtime_ns)
+    assert len(set(written)) == 1
+    write_csv(tank / "second.csv", tank_columns(1))
+    write_prepared(campaign)
+    assert kept.stat().st_mtime_ns > written[0]
+    left_out = findings_of(load_prepared(campaign)["first"])
+    assert not [each for each in left_out if each.kind.word == "left out"]
 
 
 @pytest.mark.usefixtures("empty_sheet")

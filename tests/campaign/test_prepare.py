@@ -147,14 +147,6 @@ def test_the_step_is_the_stated_one(changed, rate, dt):
         assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
 
 
-def test_the_step_is_the_files_own(changed):
-    campaign = changed(("sampling_rate = 10", ""))
-    run = campaign.prepare()["first"]
-    raw = campaign.read_run("first")
-    assert run.attrs["dt"] == DT
-    assert_array_equal(run["heave"], raw["heave"])
-
-
 def test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one(changed, tank):
     columns = tank_columns(1)
     write_csv(tank / "second.csv", columns | {"Time [s]": 1000 * columns["Time [s]"]})
@@ -332,15 +324,6 @@ def test_the_digest_follows_what_prepared_runs_depend_on(changed):
         digest("water_depth = 3.6", "water_depth = inf"),
     }
     assert (len(same), len(others), len(same | others)) == (1, 4, 5)
-
-
-def test_written_runs_come_back(campaign, tank, monkeypatch):
-    files = write_prepared(campaign, tank / "out")
-    assert files == {n: tank / "out" / f"{n}.nc" for n in ("first", "second")}
-    expected = campaign.prepare()
-    monkeypatch.setattr(type(campaign), "prepare", None)  # nothing is prepared again
-    for name, run in load_prepared(campaign, tank / "out").items():
-        xr.testing.assert_identical(run, expected[name])
 
 
 def test_interrupted_half_way_a_second_call_continues(campaign, tank):

@@ -100,13 +100,13 @@ def test_a_run_in_which_nothing_was_released_is_no_decay(model, released):
     with pytest.warns(SeakeepWarning, match="no decay from calm: .*Was anything released"):
         found = check.measured_decay(model, {"calm": calm, "released": released})
     assert found.run.values == ["released"]
-    with pytest.raises(DataError, match="no run in still water is a free decay"):
-        check.measured_decay(model, {"calm": calm})
-
-
-def test_the_refusal_without_a_decay_names_role_and_waves(model):
-    with pytest.raises(DataError, match=r"waves = 'still' and role = 'test' .*unused"):
-        check.measured_decay(model, {"waves": measured_decay_run().assign_attrs(waves="")})
+    refused = {
+        "no run in still water is a free decay": calm,
+        r"waves = 'still' and role = 'test' .*unused": released.assign_attrs(waves=""),
+    }
+    for words, run in refused.items():
+        with pytest.raises(DataError, match=words):
+            check.measured_decay(model, {"run": run})
 
 
 def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():

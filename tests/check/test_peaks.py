@@ -7,7 +7,7 @@ from records import record
 from seas import sea
 
 from seakeep import HankelDMDc, check
-from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
+from seakeep.core.extremes import fit_weibull, most_probable_extreme
 from seakeep.study import to_full_scale
 
 
@@ -49,12 +49,6 @@ def test_intervals_of_the_extreme_cover_as_they_say():
         inside.append(low < true < high)
     # 500 repetitions know a coverage of 95 % to 1 % (one SD).
     assert 0.92 <= np.mean(inside) <= 0.98
-
-
-def test_a_sine_has_one_peak_a_cycle():
-    t = np.arange(400) * 0.1
-    crossings = np.arange(1, 6) * 2 * np.pi / 0.1
-    assert peaks_between(np.sin(t), crossings) == pytest.approx(1.0, abs=2e-3)
 
 
 def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):

@@ -2,14 +2,10 @@
 
 import os
 import re
-import struct
 import subprocess
 import sys
 
 import pytest
-
-fcntl = pytest.importorskip("fcntl")  # terminals of this kind are those of Unix
-pty, termios = pytest.importorskip("pty"), pytest.importorskip("termios")
 
 WORK = """
 import time
@@ -26,30 +22,12 @@ with tell_warnings(), progress_bar("Preparing") as progress:
 """
 
 
-def shown(columns):
-    """What a program writes to a terminal of so many columns."""
-    own, other = pty.openpty()
-    fcntl.ioctl(other, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    terminal = {"TERM": "xterm-256color", "PYTHONWARNINGS": "default"}
-    environment = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "LINES")} | terminal
-    command = [sys.executable, "-c", WORK]
-    work = subprocess.Popen(command, stdin=other, stdout=other, stderr=other, env=environment)
-    os.close(other)
-    written = b""
-    try:
-        while part := os.read(own, 65536):
-            written += part
-    except OSError:  # the other end is closed
-        pass
-    finally:
-        os.close(own)
-    assert work.wait() == 0, written
-    return written.decode()
-
-
 @pytest.mark.parametrize("columns", [60, 80, 120])
 def test_a_bar_shows_counts_and_time_whole_and_notes_stand_on_lines_of_their_own(columns):
-    written = shown(columns)
+    terminal = {"TERM": "xterm-256color", "FORCE_COLOR": "1", "COLUMNS": str(columns)}
+    work = [sys.executable, "-W", "default", "-c", WORK]
+    done = subprocess.run(work, capture_output=True, check=True, env=os.environ | terminal)
+    written = done.stderr.decode()
     plain = re.sub(r"\x1b\[[0-9;?]*m", "", written)
     frames = [part for part in re.split(r"\r?\x1b\[2K|\r?\n", plain) if "/1234" in part]
     assert frames

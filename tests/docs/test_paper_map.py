@@ -1,7 +1,7 @@
 """The paper map names only what exists."""
 
-import importlib
 import re
+from pkgutil import resolve_name
 
 import pytest
 from pages import page
@@ -20,22 +20,12 @@ def quoted(text):
     return re.findall(r"`([^`]+)`", text)
 
 
-def look_up(name):
-    module, *path = name.split(".")
-    found = importlib.import_module(module)
-    for part in path:
-        if not hasattr(found, part):  # a module that its package does not hand on
-            found = importlib.import_module(f"{found.__name__}.{part}")
-        else:
-            found = getattr(found, part)
-
-
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
 def test_functions_and_tests_exist(row):
     _, functions, tests = row
     assert quoted(functions), "the row names no function"
     for name in quoted(functions):
-        look_up(name)
+        resolve_name(name)
     assert quoted(tests), "the row names no test"
     for name in quoted(tests):
         file, test = name.split("::")
@@ -54,4 +44,4 @@ def test_every_deviation_is_implemented_by_what_exists(line):
     assert re.match(r"implemented\b", state), state
     for name in quoted(line):
         if name.startswith("seakeep."):
-            look_up(name)
+            resolve_name(name)

@@ -119,14 +119,6 @@ def test_topics(tmp_path):
         read_table(path, FileSettings(group="/note"))
 
 
-def test_topics_count_from_one_instant(tmp_path):
-    """The recording's first message, so that channels of two topics fit together."""
-    path = save(tmp_path, early=number, mru=imu)
-    first = read_table(path, FileSettings(group="/early"))["time"]
-    second = read_table(path, FileSettings(group="/mru"))["receive_time"]
-    assert_array_equal(first, second)
-
-
 def test_headers_that_are_not_stamped(tmp_path):
     path = save(tmp_path, mru=lambda i: imu(i, stamped=False))
     with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):

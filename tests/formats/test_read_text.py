@@ -23,16 +23,6 @@ def write(folder, text, name="run.csv", encoding="utf-8"):
     return path
 
 
-def check_plain(run):
-    assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
-    assert run["Heave"].dims == ("time",)
-    values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
-    for name, expected in (values | {"WP 1": [3, 4, 5]}).items():
-        assert_array_equal(run[name], expected)
-    units = {str(name): each.attrs.get("units") for name, each in run.items()}
-    assert units == {"Heave": "mm", "Pitch": "deg", "WP 1": None}
-
-
 def with_comma(text):
     return text.replace(",", ";").replace(".", ",")
 
@@ -55,10 +45,28 @@ def with_comma(text):
         "Time,Heave,Pitch,WP 1\ns,mm,deg,\n" + ROWS,
         "Time,Heave,Pitch,WP 1\n[s],[mm],[deg],\n" + ROWS,
         "Time;Heave;Pitch;WP 1\ns;mm;deg;\n" + with_comma(ROWS),
+        # Heads of loggers: a mark with units or a remark, rules of signs, and ranges.
+        "#Time [s],Heave [mm],Pitch (deg),WP 1\n" + ROWS,
+        "# Time\tHeave\tPitch\tWP 1\n# s\tmm\tdeg\t-\n" + ROWS,
+        "# Time [s],Heave [mm],Pitch (deg),WP 1\n# made by a logger\n" + ROWS,
+        "# Time [s],Heave [mm],Pitch (deg),WP 1\n#-------------\n" + ROWS,
+        "# Time,Heave,Pitch,WP 1\ns,mm,deg,-\n" + ROWS,
+        "Time [s],Heave [mm],Pitch (deg),WP 1\n-----,-----,-----,----\n" + ROWS,
+        "======\nTime [s],Heave [mm],Pitch (deg),WP 1\n" + ROWS,
+        "Time,Heave,Pitch,WP 1\ns,mm,deg,-\n--------------\n" + ROWS,
+        "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0,0 : -0,0 : -0,0 : -0\n" + ROWS,
+        "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0\n" + ROWS,
     ],
 )
 def test_dialects(tmp_path, text):
-    check_plain(read_table(write(tmp_path, text)))
+    run = read_table(write(tmp_path, text))
+    assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
+    assert run["Heave"].dims == ("time",)
+    values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
+    for name, expected in (values | {"WP 1": [3, 4, 5]}).items():
+        assert_array_equal(run[name], expected)
+    units = [each.attrs.get("units") for each in run.values()]
+    assert units == ["mm", "deg", "-" if ",-\n" in text or "\t-\n" in text else None]
 
 
 def test_blanks(tmp_path):
@@ -249,25 +257,3 @@ def test_what_is_no_table(tmp_path, text, message):
     path = write(tmp_path, text)
     with pytest.raises(DataError, match=message):
         read_table(path)
-
-
-HEADS = {
-    "a mark": "#Time [s],Heave [mm],Pitch (deg),WP 1\n",
-    "a mark and units": "# Time\tHeave\tPitch\tWP 1\n# s\tmm\tdeg\t-\n",
-    "a mark, then a remark": "# Time [s],Heave [mm],Pitch (deg),WP 1\n# made by a logger\n",
-    "a mark, then a rule": "# Time [s],Heave [mm],Pitch (deg),WP 1\n#-------------\n",
-    "a mark over a row of units": "# Time,Heave,Pitch,WP 1\ns,mm,deg,-\n",
-    "a rule below": "Time [s],Heave [mm],Pitch (deg),WP 1\n-----,-----,-----,----\n",
-    "a rule above": "======\nTime [s],Heave [mm],Pitch (deg),WP 1\n",
-    "a rule below the units": "Time,Heave,Pitch,WP 1\ns,mm,deg,-\n--------------\n",
-    "ranges": "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0,0 : -0,0 : -0,0 : -0\n",
-    "one range": "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0\n",
-}
-
-
-@pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
-def test_heads_of_loggers(tmp_path, head):
-    run = read_table(write(tmp_path, head + ROWS))
-    assert run["Heave"].attrs["units"] == "mm"
-    assert run["Pitch"].attrs["units"] == "deg"
-    assert_array_equal(run["WP 1"], [3, 4, 5])

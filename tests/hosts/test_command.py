@@ -1,5 +1,7 @@
 """``seakeep export``: what it writes, what it says, and what it refuses."""
 
+from zipfile import ZipFile
+
 import pytest
 from drifting import INPUTS, STATES, drifting_run
 
@@ -86,3 +88,5 @@ def test_an_fmu_without_a_compiler_is_announced(run, cases, monkeypatch, tmp_pat
     monkeypatch.delenv("CC", raising=False)
     said = run(cases["full"].model, "--fmu rom.fmu")
     assert "rom.fmu holds sources alone: no C compiler was found" in said
+    listed = ["modelDescription.xml", "sources/rom.h", "sources/rom.c", "sources/fmi2.c"]
+    assert ZipFile(tmp_path / "rom.fmu").namelist() == listed

@@ -13,12 +13,15 @@ import pytest
 import side_work
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
+from started import started
 
 import seakeep
 from seakeep import executor as executors
 from seakeep.executor import WorkerLostError, as_finished, in_order
 from seakeep.models import processes
 
+PLACES = [*sys.path, str(Path(side_work.__file__).parent)]
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(PLACES)}
 posix = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
 
 
@@ -98,10 +101,8 @@ def alone(script, *lines):
     """Start a script of its own, which imports what a caller of the executors imports."""
     header = "import side_work\nfrom seakeep.executor import as_finished, processes\n"
     script.write_text(header + "if __name__ == '__main__':\n    " + "\n    ".join(lines))
-    places = [*sys.path, str(Path(side_work.__file__).parent)]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(places)}
     streams = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
-    return subprocess.Popen([sys.executable, str(script)], **streams, text=True, env=environment)
+    return subprocess.Popen([sys.executable, str(script)], **streams, text=True, env=ENVIRONMENT)
 
 
 @posix
@@ -174,12 +175,27 @@ def test_a_dask_cluster_gives_the_same_members_and_is_not_waited_for_once_lost(
     tmp_path, ensemble_and_run, monkeypatch
 ):
     distributed = pytest.importorskip("distributed")
-    from dask_processes import Cluster
-
     ensemble, run = ensemble_and_run
     monkeypatch.setattr(executors, "PATIENCE", 300.0)  # a busy machine answers in minutes
-    with contextlib.closing(Cluster(tmp_path, workers=2)) as cluster:
-        with executors.cluster(cluster.address) as executor:
+    options = ["--scheduler-file", "here.json", "--host", "127.0.0.1", "--no-dashboard"]
+    with contextlib.ExitStack() as stack:
+
+        def start(*words):
+            """Start a process as a user does, on loopback."""
+            command = [sys.executable, "-m", "dask", *words, *options]
+            return stack.enter_context(started(command, tmp_path, env=ENVIRONMENT))
+
+        def client(workers):
+            here = {"scheduler_file": str(tmp_path / "here.json"), "set_as_default": False}
+            found = distributed.Client(**here, timeout=30)
+            found.wait_for_workers(workers, timeout=300)
+            return found
+
+        scheduler, worker = start("scheduler", "--port", "0"), ["worker", "--no-nanny"]
+        workers = [start(*worker, "--nthreads", "1") for _ in range(2)]
+        with client(2) as ready:
+            address = ready.scheduler_info()["address"]
+        with executors.cluster(address) as executor:
             found = ensemble.forecast_summary(run, start=31.0, steps=30, executor=executor)
             for _, threads in in_order(side_work.blas_threads, None, range(8), executor):
                 assert set(threads) == {1}
@@ -188,9 +204,8 @@ def test_a_dask_cluster_gives_the_same_members_and_is_not_waited_for_once_lost(
         expected = ensemble.forecast_summary(run, start=31.0, steps=30)
         xr.testing.assert_identical(found, expected)
         monkeypatch.setattr(executors, "PATIENCE", 1.0)
-        scheduler, *workers = cluster.processes
-        for lost in (workers, [scheduler]):
-            with distributed.Client(cluster.address, set_as_default=False, timeout=15) as client:
-                lose(lost, client.get_executor(pure=False))
-            if lost is workers:
-                cluster.add_workers(1)
+        with client(2) as left:
+            lose(workers, left.get_executor(pure=False))
+        start(*worker)
+        with client(1) as left:
+            lose([scheduler], left.get_executor(pure=False))

@@ -7,8 +7,8 @@ from records import record
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality import Record
-from seakeep.quality.faults import find_held, find_outliers, noise_share, saturated
-from seakeep.quality.samples import constant, flagged, level_drift, levels, noise
+from seakeep.quality.faults import FLAGS, find_held, find_outliers, noise_share, saturated
+from seakeep.quality.samples import constant, flagged, levels, noise
 
 DT = 0.04
 T = DT * np.arange(3000)
@@ -28,13 +28,14 @@ def noisy():
 
 
 def recorded(x):
-    group = flag_samples(record(DT, x=x), PreparationSettings())
+    group = flag_samples(record(DT, heave=x), PreparationSettings())
     return Record("r", group, {"": group})
 
 
 def reported(x):
     """Kinds of findings about samples."""
-    return {each.kind.name for check in (flagged, constant, noise) for each in check(recorded(x))}
+    checks = flagged, constant, noise, levels
+    return {each.kind.name for check in checks for each in check(recorded(x))}
 
 
 def faulty(x, kind, length, place):
@@ -90,8 +91,8 @@ def test_a_sound_series_is_left_alone(noisy):
     assert not find_outliers(noise).any()
     # The share of n samples of white noise scatters by 1/√n.
     assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
-    change, certain = level_drift(noisy, DT, PERIOD)
-    assert abs(change) < 0.5 * noisy.std() or certain < 5
+    for size, kinds in ((0.4, set()), (0.7, {"DRIFT"})):  # a drift of less does no harm
+        assert reported(noisy + size * noisy.std() * np.linspace(0, 1, 3000)) == kinds
 
 
 def test_a_probe_that_dies_has_no_drift_besides():
@@ -99,8 +100,15 @@ def test_a_probe_that_dies_has_no_drift_besides():
     x = waves()
     dead = 1500 + int(np.argmax(x[1500:1600]))
     x[dead:] = x[dead]
-    assert list(levels(recorded(x))) == []
     assert reported(x) == {"STUCK"}
+
+
+def test_drop_outs_are_told_by_their_flag():
+    run = record(DT, heave=waves())
+    lost = FLAGS["missing"] * (abs(T - 10) < 1).astype(np.int16)
+    group = run.assign_coords(heave_flags=("time", lost))
+    (found,) = flagged(Record("r", group, {"": group}))
+    assert (found.kind.name, found.details["samples"]) == ("MISSING", 49)
 
 
 def test_at_rest_around_the_waves_is_not_held(noisy):

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
 
 from seakeep.report.acts import LOADS, REGULAR, Claims, Evidence
 from seakeep.study import StudyResult
@@ -24,30 +25,17 @@ def windows(changes, measured=None, judged=None):
     The keys of `changes` are words of model, measure and channel.
     """
     measured = np.ones(SHAPE) if measured is None else measured
-    cells = (*CELLS, "channel")
-    error = xr.DataArray(
-        0.3 * np.ones((len(MODELS), len(MEASURES), SIZE, SIZE, len(NAMES))),
-        {"model": MODELS, "measure": list(MEASURES), "channel": NAMES},
-        ("model", "measure", *cells),
-    )
-    for words, value in changes.items():
-        dims = {dim for dim in error.coords for word in words.split() if word in error[dim]}
-        at = {dim: [w for w in words.split() if w in error[dim]] for dim in dims}
-        error.loc[at] = value
-    error = error * (1 + 0.01 * np.random.default_rng(0).standard_normal(error.shape))
+    judged = np.ones((SIZE, SIZE), bool) if judged is None else judged
+    error = 0.3 * np.ones((len(MODELS), len(MEASURES), SIZE, SIZE, len(NAMES)))
     forecast = np.broadcast_to(measured, (len(MODELS), SIZE, *measured.shape))
-    return xr.Dataset(
-        {
-            "error": error,
-            "judged": (CELLS, np.ones((SIZE, SIZE), bool) if judged is None else judged),
-            "measured": (("window", "time", "channel"), measured),
-            "mean": (("model", *CELLS, "time", "channel"), forecast),
-            "noise_std": (("window", "channel"), np.full((SIZE, len(NAMES)), 0.1)),
-            "run": ("window", list("wxyz")),
-            "start": ("window", np.zeros(SIZE)),
-        },
-        coords={"time": TIME},
-    )
+    test = cells(NAMES, TIME, MODELS, error=error, judged=judged, measured=measured, mean=forecast,
+                 run=list("wxyz"), start=np.zeros(SIZE))  # fmt: skip
+    named = {dim: test[dim].values for dim in ("model", "measure", "channel")}
+    for words, value in changes.items():
+        at = {dim: [w for w in words.split() if w in of] for dim, of in named.items()}
+        test["error"].loc[{dim: of for dim, of in at.items() if of}] = value
+    test["error"] *= 1 + 0.01 * np.random.default_rng(0).standard_normal(error.shape)
+    return test.assign(noise_std=(("window", "channel"), np.full((SIZE, len(NAMES)), 0.1)))
 
 
 def study(groups=None, **tests):
@@ -160,11 +148,10 @@ def test_cells_that_are_not_judged_stay_out_of_the_band():
     judged = np.ones((SIZE, SIZE), dtype=bool)
     judged[0] = False
     test = windows({}, np.random.default_rng(1).normal(0, 1, SHAPE), judged)
-    edge = np.full((1, SIZE, SIZE, TIME.size, len(NAMES)), 10.0)
+    edge = np.full((len(MODELS), SIZE, SIZE, TIME.size, len(NAMES)), 10.0)
     edge[:, 0] = 0.0  # of the set of training that is not judged
-    dims = ("ensemble", *test["mean"].dims[1:])
-    test = test.assign(lower=(dims, -edge), upper=(dims, edge), ensemble=["bayesian"])
-    assert holds("load_band", study(irregular=test)) is False
+    bands = cells(NAMES, TIME, MODELS, lower=-edge, upper=edge)
+    assert holds("load_band", study(irregular=test.merge(bands))) is False
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from seakeep.report.sections.results import (
     bands,
     conditional,
     difference_table,
-    infinite_bands,
     of_judged,
     regular,
     scales,
@@ -139,16 +138,6 @@ def test_the_difference_from_the_first_model_has_a_table(result):
         ("FIR", "−20 %", "−30 to −10 %", "better", "2.5 times", "–", "cannot tell")
     ]
     assert "from m to each other model" in shown.note
-
-
-def test_bands_that_are_infinite_are_counted(result):
-    margin = xr.DataArray([[[1.0, np.inf], [2.0, 3.0]]], dims=("ensemble", "training", "channel"))
-    group = xr.Dataset({"margin": margin}, {"ensemble": ["m"], "training": ["a", "b"]})
-    assert "infinite in 1 of 4 cases (training set × channel; a)" in infinite_bands(
-        with_group(result, "calibration", group), "m"
-    )
-    bounded = group.isel(training=[1])
-    assert infinite_bands(with_group(result, "calibration", bounded), "m") == ""
 
 
 def test_errors_stand_in_both_standard_deviations(result):

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -105,24 +106,16 @@ def test_truth_holds_what_the_chain_is_judged_against(played):
 @pytest.mark.parametrize("line", ["bow", "stern"])
 def test_a_pitch_that_lifts_the_bow_lifts_the_eye_of_its_line(played, line):
     """A line's middle under still water: eye and pole at the waterline, the vessel pitched."""
-    eye = played.settings.moorings[line].eye
-    time = np.arange(0.0, 5.0, 0.5)
+    own, time = played.settings.moorings[line], np.arange(0.0, 5.0, 0.5)
 
-    class Still:
-        settings, rig = played.settings, played.rig
+    def immersed(pitch):
+        q = np.zeros((5, time.size))
+        q[2] = pitch
+        level = np.full(time.size, 0.5 * (own.eye[1] + own.pole[1]))
+        ways = {"states": lambda at: (q, q, q), "elevation": lambda x, at: level}
+        still = SimpleNamespace(settings=played.settings, rig=played.rig, **ways)
+        return _immersed(still, time, line)
 
-        def __init__(self, pitch):
-            self.pitch = pitch
-
-        def states(self, instants):
-            q = np.zeros((5, len(instants)))
-            q[2] = self.pitch
-            return q, q, q
-
-        def elevation(self, x, instants):
-            pole = played.settings.moorings[line].pole
-            return np.full(len(instants), 0.5 * (eye[1] + pole[1]))
-
-    lifted = -np.sign(eye[0]) * 0.1  # the bow points against x
-    assert not _immersed(Still(lifted), time, line).any()
-    assert _immersed(Still(-lifted), time, line).all()
+    lifted = -np.sign(own.eye[0]) * 0.1  # the bow points against x
+    assert not immersed(lifted).any()
+    assert immersed(-lifted).all()
