@@ -266,7 +266,8 @@ def compare_models(
         for name, run in prepared.items():
             time = run["time"].values
             at, last = samples_in(run, used, whole_span(run, "test"), dt, history, lead, first)
-            window: Any = run, float(time[at]), count or max(last - at, 1)
+            begin = float(time[at]) if first is None else first
+            window: Any = run, begin, count or max(last - at, 1)
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
                 how: Any = {"level": level, "band": band, "executor": executor, "progress": tell}
