@@ -17,7 +17,7 @@ DT, CHANNELS = 0.1, (["heave", "pitch"], ["eta"])
 SPEC = HankelDMDc(6, 20, 1e-2, delay_rows="exact", ridge_scale="per_snapshot")
 
 
-def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, samples=1200):
+def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, zero=0.0, samples=1200):
     """Heave and pitch of oscillators in irregular waves; heave is measured with another scale."""
     rng = np.random.default_rng(seed)
     time = DT * np.arange(samples)
@@ -25,7 +25,7 @@ def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, samples=1200):
     eta = np.cos(np.outer(time, omega) + rng.uniform(0, 2 * np.pi, 30)).sum(axis=1) / 10
     heave = signal.lfilter([0.0, stiffness], [1.0, stiffness - 1.75, 0.75], eta)
     pitch = signal.lfilter([0.0, 0.0, 0.1], [1.0, -1.6, 0.75], eta)
-    channels = {"heave": factor * heave + offset, "pitch": pitch, "eta": eta}
+    channels = {"heave": factor * heave + offset, "pitch": pitch, "eta": eta + zero}
     for x in channels.values():
         x += 0.01 * x.std() * rng.standard_normal(samples)
     return record(DT, {"encounter_period": 1.25}, **channels)
@@ -86,6 +86,13 @@ def test_of_two_runs_either_may_be_wrong():
     assert sorted((each.run, each.rival)) == ["p1", "p2"]
     assert text in each.describe() or text.replace("p1 and p2", "p2 and p1") in each.describe()
     assert "other runs" not in each.describe()
+
+
+def test_an_input_in_whose_range_no_other_run_lies_is_named_first():
+    (each,) = disagreements(SPEC, {"p1": vessel(1), "p2": vessel(4, zero=1.5)}, *CHANNELS)
+    zero = 1.5 if each.run == "p2" else 0.0
+    assert (each.reason, each.channel) == ("input", "eta")
+    assert_allclose(each.value, zero, atol=0.02)  # a twentieth of the waves' SD
 
 
 def test_an_offset_is_named_also_for_a_model_with_a_memory():

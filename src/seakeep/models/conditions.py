@@ -36,7 +36,7 @@ EXPLAINS = 0.7
 LOST = 10.0
 """Error, SD, beyond which it counts no worse."""
 
-Reason = Literal["offset", "probe position", "scale", "dynamics"]
+Reason = Literal["input", "offset", "probe position", "scale", "dynamics"]
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,13 @@ class Disagreement:
     pooled, own : float
         Mean NRMSE of free runs on its second half, in SD of its first: of the model of the first
         halves of all runs, and of that of its own.
-    reason : {"offset", "probe position", "scale", "dynamics"}
-        What makes up most of the difference; the last where nothing else does.
+    reason : {"input", "offset", "probe position", "scale", "dynamics"}
+        The mean of an input that lies outside what trained the others; or what makes up most of the
+        difference, the last where nothing else does.
     channel : str
-        State with the offset or the scale; empty for the others.
+        Input, or state with the offset or the scale; empty for the others.
     value : float
-        Offset in units of the channel, distance in m, or factor; NaN for dynamics.
+        Mean or offset in units of the channel, distance in m, or factor; NaN for dynamics.
     spread : float
         Standard deviation of a distance, m.
     rival : str
@@ -84,6 +85,9 @@ class Disagreement:
                 "takes water_depth in [rig] and the probe's x_position in [rig.positions]"
             )
         what = {
+            "input": f"the mean of {self.channel}, {self.value:.3g}, is far from that of {rest}. "
+            "If another condition, such as a wind, is the cause, fit one model per condition, or "
+            "one that varies with it: parameter in [model]. Else correct its zero",
             "offset": f"{self.channel} lies {self.value:+.3g} off where a model of {rest} has it. "
             "Correct its zero, or set centre = 'run' in [model]: departures from each run's means",
             "probe position": "its waves fit where they are carried by "
@@ -152,9 +156,10 @@ def disagreements(
                 break
             judged.remove(odd)
             del left[odd]
-            reason = _reason(fitted(left), runs[odd], steps, scales[odd], own[odd])
-            placed = False
-            if reason.get("reason") != "offset":
+            others, placed = fitted(left), False
+            reason = _input(others, runs[odd])
+            reason = reason or _reason(others, runs[odd], steps, scales[odd], own[odd])
+            if reason.get("reason") not in ("input", "offset"):
                 with contextlib.suppress(DataError, RequestError):  # no depth, or no positions
                     reason = _place(fitted(left, at_rest), runs[odd]) or reason
                     placed = True
@@ -197,6 +202,16 @@ def _errors(model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale) -
     """Errors of these, at most LOST."""
     predicted, measured = _series(model, run, steps, scale)
     return np.clip(measured - predicted, -LOST, LOST)
+
+
+def _input(model: HankelDMDcModel, run: xr.Dataset) -> dict[str, Any]:
+    """The input whose mean lies outside what trained a model of other runs, if one does."""
+    values = labelled.channel_matrix(run, model.inputs, "the run")
+    found = model.coverage.conditions(values, model.signature)
+    if not found.departs.any():
+        return {}
+    at = int(np.argmax(np.abs(found.means - found.centre) / found.spread))
+    return {"reason": "input", "channel": model.inputs[at], "value": float(found.means[at])}
 
 
 def _reason(
