@@ -70,9 +70,9 @@ def irregular(runs: Datasets, what: str) -> Groups:
     """Runs that are not regular; an error says what cannot be had without them."""
     skipped = {name: run for name, run in runs.items() if not is_regular(run)}
     if not skipped:
+        why = f"all runs ({', '.join(runs)}) are in regular waves, which hold one frequency each"
         raise DataError(
-            f"all runs ({', '.join(runs)}) are in regular waves, which hold one frequency each: "
-            f"{what} takes a run in irregular waves."
+            f"{why if runs else 'no run is in waves'}: {what} takes a run in irregular waves."
         )
     return skipped
 

@@ -196,7 +196,7 @@ def validity(model: Model, runs: Datasets) -> xr.Dataset:
             why = outside_training(model, part.run, begin, round((end - begin) / model.dt))
         outside.append("; ".join(why))
     if not parts:
-        raise DataError("no run has all channels of the model: there are no waves to compare.")
+        raise DataError("no run in waves has all channels of the model: none can be compared.")
     columns = np.moveaxis(np.array(facts), -1, 0)
     if np.isnan(columns[0]).all():
         raise no_energy(model.inputs[reference])

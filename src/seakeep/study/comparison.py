@@ -529,11 +529,14 @@ def _seconds(
 
 ATTRIBUTES = {
     "s": {"dt", "start", "encounter_period", "train_span", "test_span", "reads_input_until",
-          "input_predicted_from", "diverged_at"},
-    "m": {"water_depth", "probe_offset", "probe_offset_spread"},
+          "input_predicted_from", "diverged_at", "lead_time", "predictable", "period"},
+    "m": {"water_depth", "probe_offset", "probe_offset_spread", "x_position", "mean_surge",
+          "trained_surge"},
     "m/s": {"celerity", "alignment_celerity"},
 }  # fmt: skip
-"""Attributes of a run, or of a forecast, by their unit."""
+"""Attributes of a run, of a forecast or of their channels, by their unit."""
+UNSCALED = {"height", "trained_height", "mean", "trained_mean", "trained_std"}
+"""Attributes with a number per input, whose units a forecast does not state."""
 
 
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
@@ -552,7 +555,8 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     -------
     Dataset
         Times and values at full scale; units keep their names. ``attrs["scale"]`` says
-        ``"full"``; times, lengths and speeds among the attributes are converted with them.
+        ``"full"``; times, lengths and speeds among the attributes are converted with them, and
+        numbers per input of a live forecast left out.
 
     Raises
     ------
@@ -578,14 +582,12 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     out = _scaled(run, factor_of)
     for name in {"time", "diverged_at"} & set(run.coords):
         out[name] = (factor_of("s")[0] * run[name]).assign_attrs(run[name].attrs)
-    for variable in out.data_vars.values():
-        if "x_position" in variable.attrs:
-            variable.attrs["x_position"] = scale * float(variable.attrs["x_position"])
-    out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
+    out.attrs = {key: each for key, each in run.attrs.items() if key not in UNSCALED}
+    out.attrs |= {"scale": "full", "scale_factor": float(scale)}
     for unit, keys in ATTRIBUTES.items():
         by, _ = factor_of(unit)
-        for key in keys & run.attrs.keys():
-            out.attrs[key] = _times(by, run.attrs[key])
+        for attrs in (out.attrs, *(each.attrs for each in out.data_vars.values())):
+            attrs |= {key: _times(by, attrs[key]) for key in keys & attrs.keys()}
     if "outside_training" in run.attrs:
         out.attrs["outside_training"] = f"at model scale: {run.attrs['outside_training']}"
     if "status" in run.attrs:
