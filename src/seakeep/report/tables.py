@@ -391,10 +391,10 @@ def band_verdict(inside: float, level: float) -> str:
 
     Examples
     --------
-    >>> band_verdict(0.93, 0.95), band_verdict(0.8, 0.95), band_verdict(0.6, 0.95)
+    >>> band_verdict(1.0, 0.95), band_verdict(0.8, 0.95), band_verdict(0.6, 0.95)
     ('which is what it claims', 'not what it claims', 'far too little')
     """
-    if abs(inside - level) <= 0.05:
+    if round(abs(inside - level), 9) <= 0.05:
         return "which is what it claims"
     return "far too little" if inside < level - 0.2 else "not what it claims"
 
