@@ -70,8 +70,8 @@ class Conditions:
         Part of the energy at periods that did not train.
     heights, steepnesses : ndarray, shape (channel,)
         As those of :class:`Coverage`.
-    reasons : ndarray of bool, shape (3, channel)
-        Whether period, height and steepness lie outside.
+    reasons : ndarray of bool, shape (4, channel)
+        Whether period, height, steepness and mean lie outside.
     means : ndarray, shape (channel,)
         Mean of each input.
     centre, spread : ndarray, shape (channel,)
@@ -101,17 +101,18 @@ class Conditions:
         return f"{type(self).__name__}({'; '.join(self.sentences()) or self.validity.words})"
 
     @property
-    def departs(self) -> BoolArray:
-        """Whether the mean of each input lies far from that of training; not of a constant one."""
-        return (np.abs(self.means - self.centre) > FAR * self.spread) & (self.spread > 0.0)
-
-    @property
     def validity(self) -> Validity:
         """What lies outside the training."""
         drifts = self.surge is not None and not self.reach[0] <= self.surge <= self.reach[1]
         yes = np.append(self.reasons.any(axis=1), drifts)
-        mean = Validity.MEAN if self.departs.any() else 0
-        return Validity(int(yes @ 2 ** np.arange(4))) | mean
+        flags = [
+            Validity.PERIOD,
+            Validity.HEIGHT,
+            Validity.STEEPNESS,
+            Validity.MEAN,
+            Validity.SURGE,
+        ]
+        return Validity(int(yes @ flags))
 
     @property
     def beyond(self) -> float:
@@ -163,7 +164,7 @@ class Conditions:
                         f"{channel}: a {what} of {values[at]:.3g}{of}, trained up to "
                         f"{most[at]:.3g}{of}"
                     )
-            if self.departs[at]:
+            if self.reasons[3, at]:
                 low, high = self.centre[at] + FAR * self.spread[at] * np.array([-1.0, 1.0])
                 texts[3].append(
                     f"{channel}: a mean of {self.means[at]:.3g} {unit}, trained from {low:.3g} to "
@@ -292,6 +293,10 @@ class Coverage:
         reasons &= self.taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         if waves is not None:
             reasons &= np.isin(np.arange(len(self.channels)), waves)
+        trained, count = signature.input_scale, len(self.channels)
+        means, centre, spread = inputs.mean(axis=0), trained.centre[:count], trained.spread[:count]
+        departs = (np.abs(means - centre) > FAR * spread) & (spread > 0.0)  # no constant one
+        reasons = np.vstack([reasons, departs & (len(inputs) > 8 * self.quarter(dt))])
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
         maps = signature.input_map
         is_place = "surge" in signature.states and (maps.follows or not maps.reference)
@@ -299,9 +304,7 @@ class Coverage:
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         units = tuple(label.units for label in signature.input_labels)
-        trained = signature.input_scale.part(slice(len(self.channels)))
-        means = inputs.mean(axis=0) if len(inputs) > 8 * self.quarter(dt) else trained.centre
-        moments = means, trained.centre, trained.spread
+        moments = means, centre, spread
         return Conditions(
             self, peak, unseen, heights, steepnesses, reasons, *moments, mean, reach, units
         )
