@@ -161,9 +161,9 @@ CHANGES = {
     "core/metrics.py": [
         ("NOISE_FACTOR = 2**0.5", "NOISE_FACTOR = 2.0", "test_metrics.py::test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise"),
         ("load <= noise_std", "load <= 2 * noise_std", "tank/test_quality_on_tank.py::test_the_share_of_a_slack_line_is_that_of_the_truth"),
-        ("np.sqrt(pair.m.shape[-2] - 1)", "np.sqrt(pair.m.shape[-2])", "test_metrics.py::test_fit_percent_is_matlabs_formula"),
-        ("pair.p.min(axis=-2) - pair.m.min(axis=-2)", "pair.p.min(axis=-2) - pair.m.max(axis=-2)", "test_metrics.py::test_nammae_by_hand"),
-        ("spread = m.std(axis=-2, ddof=1)", "spread = m.std(axis=-2, ddof=0)", "test_metrics.py::test_nrmse_by_hand"),
+        ("np.sqrt(pair.m.shape[-2] - 1)", "np.sqrt(pair.m.shape[-2])", "test_metrics.py::test_measures_by_hand"),
+        ("pair.p.min(axis=-2) - pair.m.min(axis=-2)", "pair.p.min(axis=-2) - pair.m.max(axis=-2)", "test_metrics.py::test_measures_by_hand"),
+        ("spread = m.std(axis=-2, ddof=1)", "spread = m.std(axis=-2, ddof=0)", "test_metrics.py::test_measures_by_hand"),
         ("total / np.maximum(count, 1)", "total / values.shape[-1]", "test_metrics.py::test_a_slack_channel_is_nan_and_left_out_of_averages"),
     ],
     "core/observables.py": [
@@ -505,8 +505,8 @@ CHANGES = {
         ("np.clip(0.5 * (before - after) / bend", "np.clip(0.5 * (after - before) / bend", "signals/test_celerity.py::test_a_peak_between_samples"),
     ],
     "signals/panel.py": [
-        ("np.arctan2(2 * xy, xx - yy)", "np.arctan2(xy, xx - yy)", "signals/test_tracking.py::test_centroid_and_pitch_of_every_frame"),
-        ("np.sqrt(12 * (mean + sign * half))", "np.sqrt(6 * (mean + sign * half))", "signals/test_tracking.py::test_centroid_and_pitch_of_every_frame"),
+        ("np.arctan2(2 * xy, xx - yy)", "np.arctan2(xy, xx - yy)", "signals/test_tracking.py::test_motions_of_the_centre_of_gravity"),
+        ("np.sqrt(12 * (mean + sign * half))", "np.sqrt(6 * (mean + sign * half))", "signals/test_tracking.py::test_the_centroid_of_every_frame"),
     ],
     "signals/prediction.py": [
         ("away = np.abs(6.0 / (a * b * c) * away)", "away = np.abs(away)", "signals/test_prediction.py::test_a_jump_is_far_above_third_differences_of_late_and_is_taken_where_it_stays"),

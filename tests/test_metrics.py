@@ -28,27 +28,25 @@ def both(predicted=PREDICTED, measured=MEASURED):
     return {"predicted": predicted, "measured": measured}
 
 
-def test_nrmse_by_hand():
-    # Arithmetic of four numbers: rounding alone, here and below.
-    assert_allclose(metrics.nrmse(**both()), np.sqrt([0.5, 50.0]) / SD, rtol=1e-14)
+ERRORS = np.array([[1.0, 0.0], [0.0, 10.0], [1.0, 0.0], [0.0, 10.0]])
+# Minima 1 and 0, 10 and 10; maxima 3 and 4, 50 and 40.
+EXTREMES = 0.5 * np.array([1.0 + 1.0, 0.0 + 10.0]) / SD
 
 
-def test_error_over_time_by_hand():
-    errors = np.array([[1.0, 0.0], [0.0, 10.0], [1.0, 0.0], [0.0, 10.0]])
-    assert_allclose(metrics.error_over_time(**both()), (errors / SD).mean(axis=1), rtol=1e-14)
-
-
-def test_nammae_by_hand():
-    # Minima 1 and 0, 10 and 10; maxima 3 and 4, 50 and 40.
-    each = 0.5 * np.array([1.0 + 1.0, 0.0 + 10.0]) / SD
-    assert_allclose(metrics.normalised_extremes_error(**both()), each, rtol=1e-14)
-    assert metrics.nammae(**both()) == pytest.approx(each.mean(), rel=1e-14)
-
-
-def test_fit_percent_is_matlabs_formula():
-    # 100 (1 − ‖y − ŷ‖ / ‖y − mean(y)‖), as the help page of compare states it.
-    expected = 100 * (1 - np.sqrt([2.0, 200.0]) / np.sqrt([8.0, 500.0]))
-    assert_allclose(metrics.fit_percent(**both()), expected, rtol=1e-13)
+@pytest.mark.parametrize(
+    ("measure", "expected"),
+    [
+        (metrics.nrmse, np.sqrt([0.5, 50.0]) / SD),
+        (metrics.error_over_time, (ERRORS / SD).mean(axis=1)),
+        (metrics.normalised_extremes_error, EXTREMES),
+        (metrics.nammae, EXTREMES.mean()),
+        # MATLAB's 100 (1 − ‖y − ŷ‖ / ‖y − mean(y)‖), as the help page of compare states it.
+        (metrics.fit_percent, 100 * (1 - np.sqrt([2.0, 200.0]) / np.sqrt([8.0, 500.0]))),
+    ],
+)
+def test_measures_by_hand(measure, expected):
+    # Arithmetic of four numbers: rounding alone.
+    assert_allclose(measure(**both()), expected, rtol=1e-13)
 
 
 # Who is left out
@@ -201,9 +199,9 @@ def test_errors_that_models_share_cancel_in_their_difference():
         [m + scale * e for m, e in zip(measured, errors, strict=True)] for scale in (0.2, 0.1, 0.2)
     )
     found = metrics.anrmse_differences([first, half, equal], measured)
-    for name, of in (("anrmse", first), ("all_anrmse", first)):
-        own = [metrics.anrmse(predicted=p, measured=m) for p, m in zip(of, measured, strict=True)]
-        assert_array_equal(found[name][0], own if name == "anrmse" else np.mean(own))
+    own = [metrics.anrmse(predicted=p, measured=m) for p, m in zip(first, measured, strict=True)]
+    assert_array_equal(found["anrmse"][0], own)
+    assert found["all_anrmse"][0] == np.mean(own)
     # Half the error in every sample is half the ANRMSE in every draw, to rounding.
     for key in ("change", "lower", "upper"):
         assert_allclose(found[key], [[0, 0], [-0.5, -0.5], [0, 0]], atol=1e-12)
