@@ -373,11 +373,10 @@ def test_a_measurement_is_never_overwritten(tank, changed):
         assert (folder / "first.nc").read_bytes() == b"CDF"
 
 
-def test_a_byte_that_was_altered_is_noticed(campaign):
+def test_a_file_that_was_cut_off_is_made_anew(campaign):
     path = write_prepared(campaign, names=["second"])["second"]
-    content = path.read_bytes()
     (expected,) = load_prepared(campaign, names=["second"]).values()
-    path.write_bytes(content[:900] + bytes([content[900] ^ 1]) + content[901:])
+    path.write_bytes(path.read_bytes()[:-1])
     with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
         (run,) = load_prepared(campaign, names=["second"]).values()
     xr.testing.assert_identical(run, expected)

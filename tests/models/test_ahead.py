@@ -171,34 +171,36 @@ def test_where_waves_are_known_nothing_is_weighed(model):
     assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
 
 
+def weigh(parts, claimed, predicted, history=0.0):
+    """Weigh forecasts of one state, of which training has the mean zero and the variance one."""
+    one, zero = np.ones(1), np.zeros(1)
+    before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
+    windows = Windows(9, before, nothing, nothing, predicted=(predicted,))
+    errors = LeadErrors(np.eye(1), np.full((9, 1), claimed))
+    weigh_members(windows, parts, errors, Scale(zero, one, one, zero, one))
+
+
 @pytest.mark.parametrize("lost", [None, 0, 1])
 def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
-    one, zero = np.ones(1), np.zeros(1)
-    scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 9.0))
-    windows = Windows(9, *np.zeros((3, 1, 1, 1)), predicted=(3,))
     parts = np.full((3, 2, 1, 9, 1), 5.0)  # of two members, the last one's departure
     parts[:, 0] = -3.0
     if lost is None:  # a member whose departure is lost counts with the others
         parts[1, 0, :, -1] = np.nan
-        weigh_members(windows, parts, errors, scale)
+        weigh(parts, 9.0, 3)
         assert_allclose(parts[0, :, 0, :, 0].mean(axis=0), [1.0] * 3 + [0.0] * 6)
         assert_allclose(np.ptp(parts[0], axis=0), 8.0)
         return
     parts = parts[:, :1]
     parts[lost, :, :, -1] = np.nan
-    weigh_members(windows, parts, errors, scale)
+    weigh(parts, 9.0, 3)
     expected = [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan]
     assert_allclose(parts[0, 0, 0, :, 0], expected)
 
 
 @pytest.mark.parametrize(("history", "expected"), [(-1.0, 0.0), (-3.0, -3.0)])
 def test_a_sea_that_departs_from_training_is_forecast_on(history, expected):
-    one, zero = np.ones(1), np.zeros(1)
-    scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 1.2))
-    before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
-    windows = Windows(9, before, nothing, nothing, predicted=(0,))
     parts = np.full((3, 1, 1, 9, 1), -3.0)
-    weigh_members(windows, parts, errors, scale)
+    weigh(parts, 1.2, 0, history)
     assert_allclose(parts[0, 0, 0, :, 0], expected)
 
 

@@ -62,13 +62,10 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     x, u = table(unseen, STATES), table(unseen, INPUTS)
     now = round(65.0 / DT) + 1
     from_arrays = centred.forecast_arrays(x[:now], u[:now], u[now:], 120)
-    live, alone_live = centred.live(), single.live()
-    for service in (live, alone_live):
-        for at in range(now):
-            service.step(u[at], x[at])
-    served, alone_served = (
-        table(each.forecast(120, u[now:]), STATES) for each in (live, alone_live)
-    )
+    live = centred.live()
+    for at in range(now):
+        live.step(u[at], x[at])
+    served = table(live.forecast(120, u[now:]), STATES)
     mean, std, lower, upper = table(apart.forecast_summary(unseen, 65.0, 120), STATES)
     moved = expected - mean
     assert np.abs(moved).max() > 1e-3
@@ -76,7 +73,9 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     for found in (*(table(each, STATES) for each in ways), from_arrays[:4]):
         assert_allclose(found, wanted, **close)
     assert_allclose(served[0], expected, **close)
-    assert np.all(served[1] > alone_served[1])  # the members' spread comes on top
+    assert np.all(
+        served[1] > single.errors.at(np.arange(1, 121))
+    )  # the members' spread comes on top
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
     both = {name: runs[name] for name in "ac"}
     two = dataclasses.replace(settings, window=None).fit(both, STATES, INPUTS)
@@ -94,9 +93,6 @@ def test_draws_are_rounded_to_the_nearest_sample(run):
     for name in ("window", "state_delays", "input_delays"):
         expected = np.floor(draws[name] * PERIOD / DT + 0.5)
         assert_array_equal(draws[f"{name}_samples"], expected)
-    assert draws.window.min() >= 8
-    assert draws.window.max() <= 14
-    assert draws.sizes == {"member": 6}
 
 
 @pytest.mark.parametrize("sampling", ["monte_carlo", "sobol"])
@@ -237,14 +233,10 @@ def test_training_spans_are_those_of_the_members(run):
     runs = {"one": run, "two": wave_run(1)}
     for train_on in ("all", "runs", "windows"):
         ensemble = small(train_on=train_on, n_members=8).fit(runs, STATES, INPUTS, stop=60.0)
-        ends = {}
-        for number in range(8):
-            for name, span in ensemble.member(number).training_spans.items():
-                ends.setdefault(name, []).append(span)
-        assert ensemble.training_spans == {
-            name: (min(first for first, _ in spans), max(stop for _, stop in spans))
-            for name, spans in ends.items()
-        }
+        spans = [ensemble.member(number).training_spans for number in range(8)]
+        for name, found in ensemble.training_spans.items():
+            firsts, stops = zip(*[each[name] for each in spans if name in each], strict=True)
+            assert found == (min(firsts), max(stops))
 
 
 def test_forecasts_carry_the_spread_that_tells_a_slack_channel(run):

@@ -1,6 +1,5 @@
 """The report of a study: complete, self-contained, and at work in a real browser."""
 
-import csv
 import json
 import re
 import shutil
@@ -9,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from tables import rows_of
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
@@ -50,10 +50,9 @@ def result(page):
     return read_result(page.parent)
 
 
-def rows_of(page, name):
-    """Cells of a CSV file of the report, its head first."""
-    with (page.parent / "tables" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.reader(file))
+def cells_of(page, name):
+    """Cells of a CSV file of the report, without its head."""
+    return [list(row.values()) for row in rows_of(page.parent / "tables" / f"{name}.csv")]
 
 
 def changed(result, groups=(), **settings):
@@ -87,9 +86,9 @@ def test_figures_and_tables_are_files_too(page):
     figures = {path.name for path in (page.parent / "figures").iterdir()}
     for name in ("errors_unseen", "densities_bayesian", "error_over_time", "eigenvalues"):
         assert {f"{name}.png", f"{name}.svg"} <= figures
-    bands = [row[1] for row in rows_of(page, "trend")][1:]
+    bands = [row[1] for row in cells_of(page, "trend")]
     assert bands == [f"{k} frequencies" for k in ("all", "low", "wave") for _ in range(2)]
-    settings = {(model, key): told for model, key, *told in rows_of(page, "models")}
+    settings = {(model, key): told for model, key, *told in cells_of(page, "models")}
     assert settings["Bayesian", "window"] == ["uniform, 10 to 20 T̂", "stated"]
     assert settings["deterministic", "delay rows"] == ["exact", "preset"]
     assert settings["deterministic", "window"] == ["all samples", "default"]
@@ -106,7 +105,7 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
         test="unseen", model="bayesian", band="calibrated", against="measured", channel="average"
     )
     expected = [average["inside"], average["relative_width"]]
-    row = rows_of(page, "coverage_calibrated_bayesian")[-1]
+    row = cells_of(page, "coverage_calibrated_bayesian")[-1]
     assert row == ["average", *(f"{float(value):.2f}" for value in expected)]
     windows = result.groups["calibration"]["windows"].sel(ensemble="bayesian").values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
@@ -136,12 +135,11 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
     kept = result.groups["calibration"].sel(ensemble="bayesian").isel(training=training)
     for axes, name in zip(figure.axes, result.channels, strict=True):
         one = cell.sel(channel=name, model="bayesian", ensemble="bayesian")
+        at = kept.sel(channel=name)
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
-        margin, floor = (float(kept[key].sel(channel=name)) for key in ("margin", "floor"))
-        half = margin * np.hypot(one["std"].values, floor)
-        wider = one["mean"].values - half
-        mean, spread = float(one["training_mean"]), float(one["training_std"])
-        np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
+        wider = one["mean"] - at["margin"] * np.hypot(one["std"], at["floor"])
+        expected = (wider - one["training_mean"]) / one["training_std"]
+        np.testing.assert_allclose(lower.get_ydata(), expected, rtol=1e-10)
     without = {n: g for n, g in result.groups.items() if n != "calibration"}
     plain = history_figure(replace(result, groups=without), test, training, window)
     for drawn, shown in ((figure, True), (plain, False)):

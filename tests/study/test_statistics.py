@@ -10,11 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
-from seakeep.core import embed
 from seakeep.core.density import density_grid
 from seakeep.errors import SeakeepWarning
 from seakeep.metrics import nrmse
-from seakeep.models.training import gather
+from seakeep.models.training import gather, system_of
 from seakeep.report.tables import ratio_of
 from seakeep.study import read_study, run_study
 from seakeep.study.judge import (
@@ -283,18 +282,11 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
     parts, *channels = plan.taught(plan.training[1].spans)
     spec = plan.specs["printed"]
     fitted = spec.fit(parts, *channels)
-    size = fitted.coefficients.shape[1]
     # Degrees of freedom of a ridge regression: the trace of its hat matrix.
     data = gather(parts, *channels, None, spec)
-    window = data.windows[0]
-    regressors = np.concatenate(
-        [
-            embed(data.states[0], 8, window.first_column, window.columns),
-            embed(data.delayed[0], 16, window.first_column, window.columns),
-        ]
-    )
-    gram = regressors @ regressors.T
-    freedom = np.trace(np.linalg.solve(gram + 3 * np.eye(size), gram))
+    upper = np.triu(system_of((data.states, data.delayed, data.direct), data.windows, spec).gram)
+    gram = upper + np.triu(upper, 1).T
+    freedom = np.trace(np.linalg.solve(gram + 3 * np.eye(len(gram)), gram))
     assert at["rank"] == round(freedom)
     truncated = replace(spec, ridge=0.0, rank=round(freedom)).fit(parts, *channels)
     for name, model in {"ridge": fitted, "truncated": truncated}.items():
