@@ -53,6 +53,7 @@ def with_comma(text):
         "# Time [s],Heave [mm],Pitch (deg),WP 1\n#-------------\n" + ROWS,
         "# Time,Heave,Pitch,WP 1\ns,mm,deg,-\n" + ROWS,
         "Time [s],Heave [mm],Pitch (deg),WP 1\n-----,-----,-----,----\n" + ROWS,
+        "Time [s],Heave [mm],Pitch (deg),WP 1\n\n---,---,---,---\n" + ROWS,
         "======\nTime [s],Heave [mm],Pitch (deg),WP 1\n" + ROWS,
         "Time,Heave,Pitch,WP 1\ns,mm,deg,-\n--------------\n" + ROWS,
         "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0,0 : -0,0 : -0,0 : -0\n" + ROWS,
@@ -97,7 +98,7 @@ def test_words_stand_above_a_header_that_holds_another_mark(tmp_path):
 
 @pytest.mark.parametrize("units", ["", "s,m,m\n"])
 @pytest.mark.parametrize("apart", ["\n", "# remark\n"])
-@pytest.mark.parametrize("bad", ["0.00,OVR,1.0", "(sec),(mtr),(mtr)"])
+@pytest.mark.parametrize("bad", ["0.00,OVR,1.0", "nan,OVR,nan", "(sec),(mtr),(mtr)"])
 def test_a_header_stands_apart_from_a_row_that_is_no_header(tmp_path, units, apart, bad):
     text = f"time,WP fwd,heave\n{units}{apart}{bad}\n0.05,0.1,1.1\n0.10,0.2,1.2\n"
     columns = read_columns(write(tmp_path, text), FileSettings())

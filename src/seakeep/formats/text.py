@@ -179,10 +179,14 @@ def _below_words(rows: list[tuple[int, str]], delimiter: str | None) -> list[tup
     at = first = len(cells) - 1
     while at and len(cells[at - 1]) == len(cells[first]) and rows[at - 1][0] == rows[at][0] - 1:
         at -= 1
-    # Neither units nor data with a cell that is no number make a header.
-    is_other = any(_NUMBER.match(cell) or cell.startswith(_OPENED) for cell in cells[at])
-    is_header = at < first and not is_other and _units(cells[at], cells[at]) is None
-    return rows[at:] if is_header else rows
+    return rows[at:] if at < first and _may_head(rows[at][1], cells[at]) else rows
+
+
+def _may_head(line: str, cells: list[str]) -> bool:
+    """Whether a row may be a header: no rule, no units, and no data of which a cell is damaged."""
+    is_data = any(_NUMBER.match(cell) or cell.lower() in _MISSING - {""} for cell in cells)
+    is_units = any(cell.startswith(_OPENED) for cell in cells) or _units(cells, cells) is not None
+    return not (is_data or is_units or _RULE.match(line))
 
 
 def _decimal(path: Path, body: list[str], delimiter: str) -> str:
