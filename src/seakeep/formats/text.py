@@ -179,7 +179,7 @@ def _below_words(rows: list[tuple[int, str]], delimiter: str | None) -> list[tup
     at = first = len(cells) - 1
     while at and len(cells[at - 1]) == len(cells[first]) and rows[at - 1][0] == rows[at][0] - 1:
         at -= 1
-    return rows[at:] if at < first and _may_head(rows[at][1], cells[at]) else rows
+    return rows[at:] if 0 < at < first and _may_head(rows[at][1], cells[at]) else rows
 
 
 def _may_head(line: str, cells: list[str]) -> bool:
