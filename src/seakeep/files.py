@@ -512,7 +512,7 @@ def check_output(
     inputs : iterable of Path
         Files that the command reads.
     header : str, optional
-        Pattern of the start of a CSV file, which has no place for a mark.
+        Pattern of the first two lines of a CSV file, which has no place for a mark.
 
     Raises
     ------
@@ -532,8 +532,8 @@ def check_output(
         if path.suffix == ".nc" or start == HDF5:
             ours = _mark_of_netcdf(path) == kind
         elif path.suffix == ".csv":
-            line = (start + file.readline()).decode("utf-8", "replace")
-            ours = bool(header and re.match(header, line))
+            lines = start + file.readline() + file.readline()
+            ours = bool(header and re.match(header, lines.decode("utf-8", "replace")))
         else:
             ours = f"{MARK}: {kind}".encode() in start + file.read()
     if not ours:
