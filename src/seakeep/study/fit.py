@@ -138,8 +138,8 @@ def fit_campaign(
     latest = max(look_ahead(run, dt) for run in runs.values()) - dt
     if latest > 0.5 * dt:
         warn(
-            f"forecasts of this model read the waves up to {latest:.3g} s after the instant that "
-            "they forecast: it needs these waves ahead of time."
+            f"forecasts of this model read the inputs up to {latest:.3g} s after the instant that "
+            "they forecast: it needs them ahead of time."
         )
     if not settings.inputs and identified.settings.role == "model":
         warn(
