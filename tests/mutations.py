@@ -458,7 +458,7 @@ CHANGES = {
     ],
     "report/sections/histories.py": [
         ("pack(factor * values[:, k])", "pack(values[:, k])", "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
-        ('["mean", "lower", "upper"]', '["mean", "upper", "lower"]', "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
+        ("key: one[key].values for", "key: one[keys[0]].values for", "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
     ],
     "report/check_page.py": [
         ('float(own["correlation"]) < TURNED', 'float(own["correlation"]) > -TURNED', "check/test_coherence.py::test_a_channel_that_is_turned_over_is_told_so"),

@@ -265,7 +265,7 @@ def forecast_header(states: Sequence[str]) -> str:
 
 
 def look_ahead_words(seconds: float) -> str:
-    """How far a forecast reads the waves, as a clause; empty without a look-ahead."""
+    """How far a forecast reads the inputs, as a clause; empty without a look-ahead."""
     return f"reads the inputs up to {seconds:.3g} s after each instant" if seconds > 0.0 else ""
 
 
