@@ -464,6 +464,10 @@ CHANGES = {
         ("GRAVITY * period**2 / (2 * np.pi)", "GRAVITY * period / (2 * np.pi)", "quality/test_checks.py::test_waves_that_none_of_their_period_is"),
         ("1 / 3 < record.stated_period / period < 3", "record.stated_period / period < 3", "quality/test_checks.py::test_waves_that_none_of_their_period_is"),
     ],
+    "report/sections/histories.py": [
+        ("pack(factor * values[:, k])", "pack(values[:, k])", "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
+        ("key: one[key].values for", "key: one[keys[0]].values for", "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
+    ],
     "report/check_page.py": [
         ('float(own["correlation"]) < TURNED', 'float(own["correlation"]) > -TURNED', "check/test_coherence.py::test_a_channel_that_is_turned_over_is_told_so"),
     ],
@@ -475,7 +479,7 @@ CHANGES = {
         ("e.below(1 + AGED), e.above(1 - AGED)", "e.below(1 + AGED), e.below(1 + AGED)", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
         ("longer.below_other(shorter)", "shorter.below_other(longer)", "report/test_claims.py::test_the_error_of_the_stern_line_falls_as_it_is_less_slack"),
         ("result.dt, edge)[0]", "result.dt, edge)[1]", "report/test_claims.py::test_the_slow_part_of_loads_is_judged_without_the_waves"),
-        ("for model in (ENSEMBLE, SINGLE)", "for model in (SINGLE, ENSEMBLE)", "report/test_claims.py::test_errors_decide"),
+        ("act.cells((), key, ENSEMBLE), act.cells((), key, SINGLE)", "act.cells((), key, SINGLE), act.cells((), key, ENSEMBLE)", "report/test_claims.py::test_errors_decide"),
         ('loads = self.error(LOADS, "nammae")', 'loads = self.error(LOADS)', "report/test_claims.py::test_errors_decide"),
         ('each.where(at["judged"])', 'each', "report/test_claims.py::test_cells_that_are_not_judged_stay_out_of_the_band"),
         ("return False if False in known else None if None in known else True", "return None if None in known else True", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
@@ -595,6 +599,9 @@ CHANGES = {
     ],
     "study/resolve.py": [
         (' or stated.get("centre") == "run"', "", "study/test_resolve.py::test_the_reference_period_of_each_run_counts_in_encounter_periods"),
+    ],
+    "study/run.py": [
+        ('np.interp(time, true["time"], true[name])', "true[name].values[: time.size]", "study/test_statistics.py::test_the_truth_is_read_at_the_instants_of_the_windows"),
     ],
     "study/store.py": [
         ("not ((self.folder / RESULT).exists() or any(units", "not (any(units", "study/test_run.py::test_results_that_name_no_study_are_not_overwritten"),
