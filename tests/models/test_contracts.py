@@ -130,9 +130,16 @@ def test_higher_waves_and_a_drift_are_outside(tmp_path):
     (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
     assert told == "a mean surge of -3 m, upstream of the trained -1 to 1 m"
     assert outside_training(model, 1.5 * run, 20.0, 90) == []  # four waves are no sea
-    words = "eta: a mean of 1.5 m, trained from -1.41 to 1.41 m (mean and 2 SD)"
-    for away, expected in ((1.3, []), (1.5, [words])):
-        assert outside_training(model, run.assign(eta=run.eta + away), 20.0, 192) == expected
+    words = "eta: a mean of 2.2 m, trained from -2.12 to 2.12 m (mean and 3 SD)"
+    for away, steps, expected in ((2.0, 192, []), (2.2, 192, [words]), (2.2, 23, [])):
+        moved = run.assign(eta=run.eta + away)
+        assert outside_training(model, moved, 20.0, steps) == expected  # 31 are under two periods
+    # What training has too is inside, also where the model reads departures or carried waves.
+    for centre in ("pooled", "run"):
+        model = HankelDMDc(2, 8, 1.0, centre=centre).fit(
+            run.assign(eta=run.eta + 9), ["surge"], ["eta"]
+        )
+        assert outside_training(model, run.assign(eta=run.eta + 9), 50.0, 192) == []
 
 
 def test_a_forecast_says_by_how_much_and_reads_its_own_surge():

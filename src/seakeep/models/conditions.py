@@ -208,11 +208,9 @@ def _input(model: HankelDMDcModel, run: xr.Dataset) -> dict[str, Any]:
     """The input whose mean lies outside what trained a model of other runs, if one does."""
     values = labelled.channel_matrix(run, model.inputs, "the run")
     found = model.coverage.conditions(values, model.signature)
-    departs = found.reasons[3]
-    if not departs.any():
+    if not found.reasons[3].any():
         return {}
-    apart = np.abs(found.means - found.centre) / found.spread
-    at = int(np.argmax(np.where(departs, apart, 0.0)))
+    at = int(np.argmax(found.reasons[3]))
     return {"reason": "input", "channel": model.inputs[at], "value": float(found.means[at])}
 
 

@@ -28,8 +28,8 @@ PER_OCTAVE = 6
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
-FAR = 2.0
-"""Training SDs that the mean of an input may lie from that of training."""
+FAR = 3.0
+"""SDs of a training run that the mean of an input may lie beyond those of the runs."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
 
@@ -74,8 +74,6 @@ class Conditions:
         Whether period, height, steepness and mean lie outside.
     means : ndarray, shape (channel,)
         Mean of each input.
-    centre, spread : ndarray, shape (channel,)
-        Mean and standard deviation of each input in training.
     surge : float or None
         Mean, m.
     reach : ndarray, shape (2,)
@@ -91,8 +89,6 @@ class Conditions:
     steepnesses: FloatArray
     reasons: BoolArray
     means: FloatArray
-    centre: FloatArray
-    spread: FloatArray
     surge: float | None
     reach: FloatArray
     units: tuple[str, ...]
@@ -131,8 +127,8 @@ class Conditions:
             "period": self.trained.periods[self.peak],
             "unseen_energy": self.unseen,
             "mean": self.means,
-            "trained_mean": self.centre,
-            "trained_std": self.spread,
+            "trained_low": self.trained.lows,
+            "trained_high": self.trained.highs,
         }
         if self.surge is not None:
             out |= {"mean_surge": self.surge, "trained_surge": self.reach}
@@ -165,7 +161,7 @@ class Conditions:
                         f"{most[at]:.3g}{of}"
                     )
             if self.reasons[3, at]:
-                low, high = self.centre[at] + FAR * self.spread[at] * np.array([-1.0, 1.0])
+                low, high = self.trained.lows[at], self.trained.highs[at]
                 texts[3].append(
                     f"{channel}: a mean of {self.means[at]:.3g} {unit}, trained from {low:.3g} to "
                     f"{high:.3g} {unit} (mean and {FAR:g} SD)"
@@ -196,6 +192,8 @@ class Coverage:
     heights, steepnesses : ndarray, shape (channel,)
         Largest ones of a window: four SDs, of regular waves 2√2, and that over the length in deep
         water of a wave of the mean period.
+    lows, highs : ndarray, shape (channel,)
+        Least and greatest mean of a run, less and plus ``FAR`` of its SDs.
     """
 
     channels: tuple[str, ...]
@@ -203,6 +201,8 @@ class Coverage:
     shares: FloatArray
     heights: FloatArray
     steepnesses: FloatArray
+    lows: FloatArray
+    highs: FloatArray
 
     @cached_property
     def edges(self) -> FloatArray:
@@ -240,9 +240,13 @@ class Coverage:
         first = int(np.floor(PER_OCTAVE * np.log2(1.0 / (longest * dt))))
         count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
         energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
-        most = np.max([_heights(each, dt) for each in series], axis=0)
+        heights, steepnesses = np.max([_heights(each, dt) for each in series], axis=0)
         shares = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
-        return cls(tuple(channels), first, shares, *most)
+        means = np.stack([each.mean(axis=0) for each in series])
+        # A constant is itself but for its rounding.
+        room = FAR * np.stack([each.std(axis=0) for each in series]) + 1e-9 * np.abs(means)
+        lows, highs = (means - room).min(axis=0), (means + room).max(axis=0)
+        return cls(tuple(channels), first, shares, heights, steepnesses, lows, highs)
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
@@ -269,11 +273,11 @@ class Coverage:
     ) -> Conditions:
         """Compare inputs (time, channel) with those of training, over a `duration` in s.
 
-        Judged are those that are `waves`, by their places; by default all.
+        Of inputs that are not among `waves`, by their places, the mean alone is judged.
 
         The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
-        tenth, are no reason. What moves for five periods or less is not judged. The mean is, also
-        of what is no wave, from two periods of the waves on.
+        tenth, are no reason. Waves are judged from five periods on, means from two; none where a
+        model departs from the means of each run.
         """
         dt = signature.dt
         energy = band_energy(inputs, dt, self.first, self.shares.shape[1])
@@ -293,10 +297,11 @@ class Coverage:
         reasons &= self.taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         if waves is not None:
             reasons &= np.isin(np.arange(len(self.channels)), waves)
-        trained, count = signature.input_scale, len(self.channels)
-        means, centre, spread = inputs.mean(axis=0), trained.centre[:count], trained.spread[:count]
-        departs = (np.abs(means - centre) > FAR * spread) & (spread > 0.0)  # no constant one
-        reasons = np.vstack([reasons, departs & (len(inputs) > 8 * self.quarter(dt))])
+        means = inputs.mean(axis=0)
+        departs = (means < self.lows) | (means > self.highs)
+        if len(inputs) <= 8 * self.quarter(dt) or signature.input_map.reference:
+            departs[:] = False
+        reasons = np.vstack([reasons, departs])
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
         maps = signature.input_map
         is_place = "surge" in signature.states and (maps.follows or not maps.reference)
@@ -304,9 +309,8 @@ class Coverage:
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         units = tuple(label.units for label in signature.input_labels)
-        moments = means, centre, spread
         return Conditions(
-            self, peak, unseen, heights, steepnesses, reasons, *moments, mean, reach, units
+            self, peak, unseen, heights, steepnesses, reasons, means, mean, reach, units
         )
 
 

@@ -57,8 +57,8 @@ enum { PLACED = {{ follows.placed | length }}, TAPS = {{ foresight.shape[3] }} }
 {{ array("shares", coverage.shares) -}}
 {{ array("heights", coverage.heights) -}}
 {{ array("steepnesses", coverage.steepnesses) -}}
-{{ array("input_centre", signature.input_scale.centre[:Q]) -}}
-{{ array("input_spread", signature.input_scale.spread[:Q]) }}
+{{ array("lows", coverage.lows) -}}
+{{ array("highs", coverage.highs) }}
 static const int elevations[] = { {% for each in coverage.elevations %}{{ 1 if each else 0 }}, {% endfor %}0 };
 #define TRAINED {{ validity.TRAINED | hex }}
 enum { BANDS = {{ coverage.shares.shape[1] }} };
@@ -575,7 +575,7 @@ int {{ name }}_validity({{ name }}_estimator *e)
         int peak = 0, moves = 0;
         for (int t = 0; t < size; t++)
             mean += input(e, t)[q] / size;
-        if (size > 8 * GAP && fabs(mean - input_centre[q]) > {{ validity.FAR | hex }} * input_spread[q] && input_spread[q] > 0.0)
+        if (size > 8 * GAP && (mean < lows[q] || mean > highs[q]))
             outside |= {{ upper }}_MEAN;
         if (!waves[q])
             continue;
