@@ -58,7 +58,7 @@ class Validity(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Waves and mean surge against those of training.
+    """Waves, means of inputs and mean surge against those of training.
 
     Parameters
     ----------
@@ -240,14 +240,14 @@ class Coverage:
         first = int(np.floor(PER_OCTAVE * np.log2(1.0 / (longest * dt))))
         count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
         energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
-        most = np.max([_heights(each, dt) for each in series], axis=0)
+        heights, steepnesses = np.max([_heights(each, dt) for each in series], axis=0)
         shares = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
         means, spreads = (
             np.stack([of(each, axis=0) for each in series]) for of in (np.mean, np.std)
         )
         room = FAR * spreads + 1e-9 * np.abs(means)  # a constant is itself but for its rounding
         bounds = (means - room).min(axis=0), (means + room).max(axis=0)
-        return cls(tuple(channels), first, shares, *most, *bounds)
+        return cls(tuple(channels), first, shares, heights, steepnesses, *bounds)
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
