@@ -191,15 +191,16 @@ def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     assert_allclose(parts[0, 0, 0, :, 0], expected)
 
 
-@pytest.mark.parametrize(("history", "expected"), [(-1.0, 0.0), (-3.0, -3.0)])
-def test_a_sea_that_departs_from_training_is_forecast_on(history, expected):
+def test_a_sea_that_departs_from_training_is_forecast_on():
     one, zero = np.ones(1), np.zeros(1)
     scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 1.2))
-    before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
-    windows = Windows(9, before, nothing, nothing, predicted=(0,))
-    parts = np.full((3, 1, 1, 9, 1), -3.0)
+    # Near the mean, far on one side of it, and far on either side in turn.
+    histories = np.array([[-1.0, -1.0], [-3.0, -3.0], [-3.0, 3.0]])[..., None]
+    nothing = np.zeros((3, 1, 1))
+    windows = Windows(9, histories, nothing, nothing, predicted=(0, 0, 0))
+    parts = np.full((3, 1, 3, 9, 1), -3.0)
     weigh_members(windows, parts, errors, scale)
-    assert_allclose(parts[0, 0, 0, :, 0], expected)
+    assert_allclose(parts[0, 0, :, :, 0], np.repeat([[0.0], [-3.0], [0.0]], 9, axis=1))
 
 
 def test_errors_of_several_models_are_known_as_far_as_those_of_any():
