@@ -61,7 +61,7 @@ CHANGES = {
         ("np.abs(left[:, order] * right[:, order])", "np.abs(right[:, order] * right[:, order])", "check/test_free.py::test_modes_say_which_states_take_part"),
         ("order[values[order].imag >= 0]", "order[values[order].imag > 0]", "check/test_free.py::test_modes_say_which_states_take_part"),
         ("(amplitude**2 * (2 if apart else 1))", "(amplitude**2 * 2)", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
-        ("np.where(waves, 0.0, parts[run].inputs.mean(axis=0))", "np.zeros(len(waves))", "check/test_second_order.py::test_drift_is_counted_from_the_rest_in_the_wind_of_the_run"),
+        ("np.where(waves, 0.0, each.mean(axis=0))", "np.zeros(len(waves))", "check/test_second_order.py::test_drift_is_counted_from_the_rest_in_the_wind_of_the_run"),
         ("samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
     ],
     "check/parts.py": [

@@ -23,7 +23,7 @@ from seakeep.check.parts import (
 from seakeep.check.response import measured_response, transfer
 from seakeep.conventions import MOTIONS, canonical_channel
 from seakeep.core.extremes import free_decay
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError, RequestError, quiet
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.labelled import Span, channel_matrix, mean_period
 from seakeep.models.linear import modes as modes_of
@@ -226,8 +226,8 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         at difference 0 the mean; ``phase`` (degrees, against the wave group at the reference
         probe); over (point, state): ``offset`` and ``offset_uncertainty`` of regular runs,
         per amplitude squared, counted from the model's rest in still water where all but the waves
-        is as in the run, with ``run`` and
-        ``point_frequency``. ``attrs``: ``amplitude`` (m) and ``reference``.
+        is as in the run, with ``run`` and ``point_frequency``. ``attrs``: ``amplitude`` (m) and
+        ``reference``.
 
     Raises
     ------
@@ -277,17 +277,15 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     # Offsets of regular runs from the model's rest, per amplitude squared.
     offsets: dict[str, Any] = {}
     if regular := {name: run for name, run in runs.items() if is_regular(run)}:
-        at, parts = measured_response(model, regular), used_parts(model, regular)
+        at = measured_response(model, regular)
+        with quiet():  # of runs that are left out it has warned
+            parts = used_parts(model, regular)
+        used = [parts[str(run)].inputs for run in at["run"].values]
+        calm = [np.where(waves, 0.0, each.mean(axis=0)) for each in used]
+        columns = np.stack([_columns(single, each[None])[0] for each in calm])
         means = np.concatenate([single.input_scale.mean, single.signature.direct_scale.mean])
-
-        def rest(run: str) -> FloatArray:
-            calm = np.where(waves, 0.0, parts[run].inputs.mean(axis=0))
-            columns = _columns(single, np.tile(calm, (samples, 1)))[0]
-            moved: FloatArray = single.state_mean + slow[0].real @ (columns - means)
-            return moved
-
+        rests = single.state_mean + (columns - means) @ slow[0].real.T
         square = at["wave_amplitude"].values[:, None] ** 2
-        rests = np.stack([rest(str(run)) for run in at["run"].values])
         offset = at["offset"].values + single.state_scale.centre - rests
         offsets = {
             "offset": (("point", "state"), offset / square),

@@ -242,12 +242,11 @@ class Coverage:
         energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
         heights, steepnesses = np.max([_heights(each, dt) for each in series], axis=0)
         shares = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
-        means, spreads = (
-            np.stack([of(each, axis=0) for each in series]) for of in (np.mean, np.std)
-        )
-        room = FAR * spreads + 1e-9 * np.abs(means)  # a constant is itself but for its rounding
-        bounds = (means - room).min(axis=0), (means + room).max(axis=0)
-        return cls(tuple(channels), first, shares, heights, steepnesses, *bounds)
+        means = np.stack([each.mean(axis=0) for each in series])
+        # A constant is itself but for its rounding.
+        room = FAR * np.stack([each.std(axis=0) for each in series]) + 1e-9 * np.abs(means)
+        lows, highs = (means - room).min(axis=0), (means + room).max(axis=0)
+        return cls(tuple(channels), first, shares, heights, steepnesses, lows, highs)
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
