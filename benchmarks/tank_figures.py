@@ -23,16 +23,8 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.cli.console import print_table
 from seakeep.errors import RequestError
-from seakeep.report.figures.histories import quality_figure
-from seakeep.report.style import (
-    COLOURS,
-    DASHED,
-    PALETTE,
-    SERIES,
-    figure_style,
-    new_figure,
-    save_figure,
-)
+from seakeep.report.figures.histories import draw_spectra, quality_figure
+from seakeep.report.style import COLOURS, PALETTE, SERIES, figure_style, new_figure, save_figure
 from seakeep.report.tables import Table, write_csv
 from seakeep.signals import (
     encounter_period,
@@ -224,25 +216,16 @@ def tank_spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -
     stated = {repr(each): each for sea in seas if (each := settings.runs[sea.run].spectrum)}
     for edge in (edge for each in stated.values() for edge in each.band):
         axes.axvline(edge, color=PALETTE["grey"], linewidth=0.8, linestyle=":")
-    for each, dash in zip(stated.values(), ("-", ":") * len(stated), strict=False):
-        line = {"color": COLOURS["measured"], "linestyle": dash}
-        axes.plot(f, spectral_density(each, f), label=f"nominal ({SEAS[each.kind]})", **line)
+    nominal = [
+        (f"nominal ({SEAS[each.kind]})", (f, spectral_density(each, f))) for each in stated.values()
+    ]
     fine = [wave_spectrum(each.elevation, each.dt) for each in seas]
     rough = [paper_peak(each.elevation, each.dt)[1:] for each in seas]
-    for label, curves, kind, dash in (
-        ("measured, segments of 60 s", fine, "ensemble", "-"),
-        ("measured, paper's Welch settings", rough, "forecast", DASHED),
-    ):
-        if curves:  # at the frequencies of the first: records differ in length
-            at = curves[0][0]
-            mean = np.mean([np.interp(at, *each) for each in curves], axis=0)
-            axes.plot(at, mean, label=label, color=COLOURS[kind], linestyle=dash)
-    regular = np.unique((_regular_waves(settings) / (2 * np.pi)).round(3))
-    for number, frequency in enumerate(regular):
-        line = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
-        axes.axvline(frequency, **line, label=None if number else "regular waves")
-    axes.set_ylim(bottom=0)
-    axes.legend(fontsize=8)
+    measured = {
+        "recommended": ("measured, segments of 60 s", fine),
+        "paper": ("measured, paper's Welch settings", rough),
+    }
+    draw_spectra(axes, nominal, measured, _regular_waves(settings) / (2 * np.pi))
     axes.set(xlim=(0.15, 1.6), xlabel="frequency $f$ [Hz]", ylabel="$E$ [m²/Hz]")
     return figure
 

@@ -166,6 +166,8 @@ def test_text_states_what_it_is_and_csv_by_its_header(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text("# seakeep_file: campaign\n")
     check_output(path, "campaign")
+    path.write_text("#" * 100_000 + "\n# seakeep_file: campaign\n" + "#" * 100_000)
+    check_output(path, "campaign")
     path.write_text("[campaign]\n")
     with pytest.raises(RequestError, match="exists and is not a campaign"):
         check_output(path, "campaign")

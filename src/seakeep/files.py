@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FORMAT = 12
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
-"""Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
+"""Attribute of a NetCDF file of ours, and word somewhere in a text or picture: ``KIND``."""
 SEAL = b"seakeep CRC-32 "
 """Marker between the content of a NetCDF file and its checksum; HDF5 reads no further. A SHA-256
 would take half of the time of reading a large result."""
@@ -512,7 +512,7 @@ def check_output(
     inputs : iterable of Path
         Files that the command reads.
     header : str, optional
-        Pattern of the start of a CSV file, which has no place for a mark.
+        Pattern of the first two lines of a CSV file, which has no place for a mark.
 
     Raises
     ------
@@ -527,13 +527,15 @@ def check_output(
             f"{path} is read by this command and would be overwritten by the {kind}. "
             "Choose another name."
         )
-    content = path.read_bytes()
-    if path.suffix == ".nc" or content.startswith(HDF5):
-        ours = _mark_of_netcdf(path) == kind
-    elif path.suffix == ".csv":
-        ours = bool(header and re.match(header, content.decode("utf-8", "replace")))
-    else:
-        ours = f"{MARK}: {kind}".encode() in content
+    with path.open("rb") as file:
+        start = file.read(len(HDF5))
+        if path.suffix == ".nc" or start == HDF5:
+            ours = _mark_of_netcdf(path) == kind
+        elif path.suffix == ".csv":
+            lines = start + file.readline() + file.readline()
+            ours = bool(header and re.match(header, lines.decode("utf-8", "replace")))
+        else:
+            ours = f"{MARK}: {kind}".encode() in start + file.read()
     if not ours:
         raise RequestError(
             f"{path} exists and is not a {kind} that seakeep wrote; it may be a measurement. "

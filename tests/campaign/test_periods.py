@@ -7,7 +7,9 @@ from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep.campaign import read_campaign
+from seakeep.errors import RequestError
 from seakeep.models.settings import periods_to_samples
+from seakeep.quality import findings_of
 from seakeep.study import fit_campaign
 
 PERIOD = 1.6
@@ -16,7 +18,7 @@ STATED = ("scale_factor = 30.0", f"encounter_period = {PERIOD}")
 
 def test_all_lengths_of_a_campaign(edited):
     """The same campaign in seconds and in periods gives the same runs."""
-    redundant = "[redundant.motion]\nchannels = ['heave', 'eta_fwd']\nwindow = 4.8\n[preparation]"
+    redundant = "[redundant.motion]\nchannels = ['heave', 'eta_fwd']\nwindow = 4\n[preparation]"
     record = "span = [3.2, 16]\nrecord = [1.6, 19.2]"
     path = edited(STATED, ("[preparation]", redundant), ("span = [2, 18]", record))
     seconds = read_campaign(path)
@@ -26,7 +28,7 @@ def test_all_lengths_of_a_campaign(edited):
         ("test = [10, inf]", "test = ['6.25 T', inf]"),
         ("span = [3.2, 16]", "span = ['2 T', 16]"),
         ("record = [1.6, 19.2]", "record = ['1 T', '12 T']"),
-        ("window = 4.8", "window = '3 T'"),
+        ("window = 4", "window = '2.5 T'"),
     )
     periods = read_campaign(path)
     assert periods.digest != seconds.digest
@@ -34,6 +36,7 @@ def test_all_lengths_of_a_campaign(edited):
     assert list(found) == list(expected)
     for name, run in found.items():
         xr.testing.assert_allclose(run, expected[name], rtol=1e-10, atol=1e-13)
+        assert findings_of(run) == findings_of(expected[name])
         told = {k: v for k, v in run.attrs.items() if k not in ("campaign_digest", "quality")}
         for key, value in told.items():
             stated = expected[name].attrs[key]
@@ -53,6 +56,22 @@ def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(chan
     assert 0 <= float(run["time"][0]) - period < 0.1
     assert 0 <= 7.5 * period - float(run["time"][-1]) < 0.1
     assert run.attrs["encounter_period"] == period
+
+
+@pytest.mark.parametrize("key", ["record", "span", "train", "test"])
+@pytest.mark.parametrize("use", ["read_run", "prepare"])
+def test_a_span_that_runs_backwards_in_any_run_stops_all(changed, key, use):
+    """With the measured period of some 1.4 s, and with a stated one at once."""
+    irregular = "train = [0, 10]", "waves = 'irregular'\ntrain = [0, 10]"
+    backwards = 'role = "test"\nspan = [2, 18]', f"waves = 'regular'\n{key} = [12, '7 T']"
+    campaign = changed(irregular, backwards)
+    work = {"read_run": lambda: campaign.read_run("first"),
+            "prepare": lambda: campaign.prepare(["first"])}[use]  # fmt: skip
+    with pytest.raises(RequestError, match=rf"^runs\.second\.{key}: received \[12.0, 7 T\]"):
+        work()
+    with pytest.raises(RequestError, match=r"runs\.second.*with an encounter period of 1\.6 s is "
+                                           r"\[12, 11\.2\]"):  # fmt: skip
+        changed(STATED, irregular, backwards)
 
 
 @pytest.mark.parametrize(("waves", "seconds"), [("", 5.0), ("waves = 'still'", 20.0)])

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from seas import sea
 from small_tank import tank_columns, write_csv
+from tutorial_study import edit
 
 from seakeep.campaign import read_campaign
 from seakeep.signals import rotation_matrix
@@ -248,3 +249,12 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
     run = campaign.prepare()["r"]
     assert words[way] in run.attrs["clock_camera"]
     assert run.attrs["clock_camera_offset"] == pytest.approx(clock.offset)
+    if way == "shared":  # the channels fall together once the clock is turned back
+        pair = run[["draught", "heave"]].isel(time=slice(100, -100))
+        assert np.corrcoef(pair["draught"], pair["heave"])[0, 1] > 0.999
+    seconds, period = "window = 24\nlargest_lag = 6\n", "[campaign]\nencounter_period = 3\n"
+    text = path.read_text().replace("[preparation]", f"{seconds}[preparation]")
+    path.write_text(period + text)
+    expected = read_campaign(path).clocks()["r"]["camera"]
+    edit(path, ("window = 24", "window = '8 T'"), ("largest_lag = 6", "largest_lag = '2 T'"))
+    assert read_campaign(path).clocks()["r"]["camera"] == expected

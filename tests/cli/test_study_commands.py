@@ -4,12 +4,16 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import pytest
 from started import started
 from tutorial_study import edit
 
 from seakeep import executor
+from seakeep.cli.study import _write_reproduction
+from seakeep.study import StudyResult
 
 pytest.importorskip("matplotlib")
 
@@ -25,6 +29,36 @@ def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, com
     (out / "report.html").unlink()
     assert command("report", out)[0].strip() == str(out / "report.html")
     assert (out / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("near", "words"),
+    [
+        (False, ["Report of act a 0/9: figure", "Report of act b 0/9: figure"]),
+        (True, ["Report 0/2: page of a", "Report 1/2: page of b"]),
+    ],
+)
+def test_each_page_of_a_reproduction_is_named_before_it_is_drawn(
+    near, words, monkeypatch, tmp_path
+):
+    told = []
+
+    def bar(what):
+        return nullcontext(lambda done, total, name: told.append(f"{what} {done}/{total}: {name}"))
+
+    def drawn(result, tell=None):
+        if tell:
+            tell(0, 9, "figure")
+
+    monkeypatch.setattr("seakeep.cli.study.progress_bar", bar)
+    monkeypatch.setattr("seakeep.report.sections.write_report", drawn)
+    monkeypatch.setattr("seakeep.report.acts.write_reproduction", lambda *each: each[0])
+    if near:
+        monkeypatch.setattr("seakeep.executor.Pool", ThreadPoolExecutor)
+    acts = {name: StudyResult(tmp_path, {"study": f"act {name}"}, {}) for name in ("a", "b")}
+    with ThreadPoolExecutor(1) as threads:
+        _write_reproduction(tmp_path, acts, threads)
+    assert told == words
 
 
 @pytest.mark.parametrize("verb", ["study", "reproduce"])

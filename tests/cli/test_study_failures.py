@@ -46,6 +46,12 @@ def of_another(folder):
     units.write("unit", {})
 
 
+def with_damaged_truth(folder):
+    edit(folder / "study.toml", ("seed = 3", 'seed = 3\ntruth = "truth"'))
+    (folder / "truth").mkdir()
+    (folder / "truth" / "unseen.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
+
+
 def a_file(folder):
     (folder / "out").write_text("a file", "utf-8")
 
@@ -72,6 +78,11 @@ def a_file(folder):
             without_line,
             2,
             ["run3.csv has no column 'FWD_LINE'", "Its columns: t, WP_01", "Name one of these"],
+        ),
+        (
+            with_damaged_truth,
+            1,
+            ["unseen.nc cannot be read as true channels. Play the tank again."],
         ),
         (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
         (a_file, 1, ["results could not be written to", "or choose a folder"]),

@@ -62,6 +62,20 @@ def test_time_stamps_count_from_the_first(tmp_path):
     assert_allclose(read_table(path)["time"], T, atol=1e-6)
 
 
+def test_scaled_channels(tmp_path):
+    """Counts with a linear scale in the properties are read in the scale's unit."""
+    scale = {
+        "NI_Number_Of_Scales": 1,
+        "NI_Scale[0]_Scale_Type": "Linear",
+        "NI_Scale[0]_Linear_Slope": 0.5,
+        "NI_Scale[0]_Linear_Y_Intercept": 10.0,
+        "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
+        "wf_increment": STEP,
+    }
+    path = save(tmp_path, channel("load", np.arange(200, dtype=np.int32), **scale))
+    assert_array_equal(read_table(path)["load"], 10 + 0.5 * np.arange(200))
+
+
 def test_groups(tmp_path):
     path = save(
         tmp_path,

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
 from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.formats import read_columns
 
 PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
 
@@ -52,6 +53,7 @@ def with_comma(text):
         "# Time [s],Heave [mm],Pitch (deg),WP 1\n#-------------\n" + ROWS,
         "# Time,Heave,Pitch,WP 1\ns,mm,deg,-\n" + ROWS,
         "Time [s],Heave [mm],Pitch (deg),WP 1\n-----,-----,-----,----\n" + ROWS,
+        "Time [s],Heave [mm],Pitch (deg),WP 1\n\n---,---,---,---\n" + ROWS,
         "======\nTime [s],Heave [mm],Pitch (deg),WP 1\n" + ROWS,
         "Time,Heave,Pitch,WP 1\ns,mm,deg,-\n--------------\n" + ROWS,
         "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0,0 : -0,0 : -0,0 : -0\n" + ROWS,
@@ -77,14 +79,32 @@ def test_blanks(tmp_path):
     assert_array_equal(run["Pitch"], [-2, 2])
 
 
+@pytest.mark.parametrize("words", [" of four words here\n\n", "\n three words here\n"])
 @pytest.mark.parametrize("mark", [" ", "\t"])
-def test_words_stand_above_the_header(tmp_path, mark):
+def test_words_stand_above_the_header(tmp_path, mark, words):
     table = "Time Heave Pitch WP\n(s) (mm) (kN-m) (-)\n0 1.5 -2 3\n0.1 1 2 4\n"
-    text = f"Made by a program, on a day: no 7\n of four words here\n\n{table.replace(' ', mark)}"
+    text = f"Made by a program, on a day: no 7\n{words}{table.replace(' ', mark)}"
     run = read_table(write(tmp_path, text, "run.out"))
     units = {str(name): each.attrs.get("units") for name, each in run.items()}
     assert units == {"Heave": "mm", "Pitch": "kN-m", "WP": "-"}
     assert_array_equal(run["Pitch"], [-2, 2])
+
+
+def test_words_stand_above_a_header_that_holds_another_mark(tmp_path):
+    text = "Made by a program\n\nTime Heave WP,1\n0 1.5 3\n0.1 1 4\n"
+    run = read_table(write(tmp_path, text), FileSettings(delimiter=" "))
+    assert list(run.data_vars) == ["Heave", "WP,1"]
+
+
+@pytest.mark.parametrize("units", ["", "s,m,m\n"])
+@pytest.mark.parametrize("apart", ["\n", "# remark\n"])
+@pytest.mark.parametrize("bad", ["0.00,OVR,1.0", "nan,OVR,nan", "(sec),(mtr),(mtr)"])
+def test_a_header_stands_apart_from_a_row_that_is_no_header(tmp_path, units, apart, bad):
+    text = f"time,WP fwd,heave\n{units}{apart}{bad}\n0.05,0.1,1.1\n0.10,0.2,1.2\n"
+    columns = read_columns(write(tmp_path, text), FileSettings())
+    assert list(columns.headers) == ["time", "WP fwd", "heave"]
+    line = 4 if units else 3
+    assert f"line {line}, column 'WP fwd'" in columns.faults["WP fwd"]
 
 
 def test_options(tmp_path):

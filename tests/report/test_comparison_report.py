@@ -265,6 +265,17 @@ def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path)
     assert "scale" not in write_forecast(small.forecast, tmp_path / "s.csv").read_text()
 
 
+def test_only_columns_with_an_average_have_its_row():
+    errors, bounds, extremes = comparison_blocks(comparison_table([comparison()]))
+    channels = ["heave", "pitch", "mooring_stern"]
+    for table in (errors, bounds):
+        assert [row[0] for row in table.rows] == [*channels, "average"]
+        assert [*table.averages] == [3]
+    assert errors.rows[-1][1] == "0.100"
+    assert [row[0] for row in extremes.rows] == channels
+    assert [*extremes.averages] == []
+
+
 def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit():
     judged = comparison()
     words = "Bow line LC-1 (FWD), 2 $ shackles, 1 $ pin"

@@ -1,5 +1,6 @@
 """The report of a study: complete, self-contained, and at work in a real browser."""
 
+import base64
 import csv
 import json
 import re
@@ -9,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.testing import assert_allclose
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
@@ -31,7 +33,7 @@ from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
 from seakeep.report.sections.data import waves
-from seakeep.report.sections.histories import histories
+from seakeep.report.sections.histories import MISSING, histories
 
 CHANNELS = 'states = ["heave", "pitch", "heave_rate"]\ninputs = ["eta_fwd", "eta_mid"]'
 NAMED = STUDY.replace("seed = 3", CHANNELS).replace("length = 6", 'length = 6\nlabel = "a & b < c"')
@@ -247,6 +249,30 @@ def test_the_time_histories_zoom_and_choose(browser, page):
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
     assert browser.get_log("browser") == []
+
+
+def test_cells_of_the_time_histories_are_the_forecasts_in_degrees(page, result):
+    script = (page.parent / "histories" / "unseen-1.js").read_text("utf-8")
+    cells = json.loads(script.removeprefix('seakeepCells["unseen-1"]=').removesuffix(";\n"))
+    at = result.tests["unseen"].isel(training=1, window=2)
+    bands = at.sel(ensemble="bayesian")
+    cell, bayesian = cells["2"], cells["2"]["models"]["bayesian"]
+    parts = [
+        (cell["measured"], at["measured"]),
+        (cell["models"]["deterministic"]["mean"], at["mean"].sel(model="deterministic")),
+        (bayesian["mean"], at["mean"].sel(model="bayesian")),
+        (bayesian["lower"], bands["lower"]),
+        (bayesian["upper"], bands["upper"]),
+    ]
+    for packed, values in parts:
+        for channel, factor in {"heave": 1.0, "pitch": np.rad2deg(1.0)}.items():
+            each = packed[result.channels.index(channel)]
+            codes = np.frombuffer(base64.b64decode(each["data"]), "<u2")
+            step = (each["high"] - each["low"]) / (MISSING - 1)
+            wanted = factor * values.sel(channel=channel)
+            assert_allclose(each["low"] + step * codes, wanted, rtol=0, atol=step)
+    errors = at["error"].sel(model="bayesian", measure="nrmse")
+    assert_allclose(bayesian["nrmse"], errors, rtol=0, atol=0.0005)
 
 
 def test_a_dollar_in_a_label_starts_no_formula(result):

@@ -246,7 +246,7 @@ def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, command):
 
 def test_a_lead_reads_waves_ahead_of_time(halves):
     asked = campaign(halves, f"{EXACT}\nlead = 8")
-    with pytest.warns(SeakeepWarning, match=r"read the waves up to 0\.7 s after the instant that"):
+    with pytest.warns(SeakeepWarning, match=r"read the inputs up to 0\.7 s after the instant that"):
         model = fit_campaign(asked)
     with pytest.warns(SeakeepWarning, match=r"of all reads the inputs up to 0\.7 s after"):
         compare(model, asked, steps=20)

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run_study
@@ -129,10 +129,21 @@ def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
         UnitFolder(tmp_path, "one").open("first")
 
 
-@pytest.mark.parametrize("result", [f"{UNITS}/one.nc", RESULT])
-def test_results_that_name_no_study_are_not_overwritten(result, tmp_path):
+def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_path):
+    study, told = read_study(study_folder / "study.toml"), []
+    shutil.copy(finished.folder / RESULT, tmp_path)
+    assert_same(finished, run_study(study, tmp_path, progress=lambda *each: told.append(each[2])))
+    assert told == ["finished before"]
+    with pytest.raises(RequestError, match="holds the results of another study"):
+        UnitFolder(tmp_path, "two").check()
+    (tmp_path / RESULT).write_bytes(b"")
+    with pytest.raises(DataError, match="was cut off, altered or damaged"):
+        UnitFolder(tmp_path, study.digest).check()
+
+
+def test_results_that_name_no_study_are_not_overwritten(tmp_path):
     (tmp_path / UNITS).mkdir()
-    (tmp_path / result).write_bytes(b"")
+    (tmp_path / UNITS / "one.nc").write_bytes(b"")
     with pytest.raises(RequestError, match=r"holds results, and .* does not say of which study"):
         UnitFolder(tmp_path, "one").open("first")
 

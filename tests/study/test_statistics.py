@@ -37,9 +37,11 @@ def found(tmp_path_factory):
     put_tutorial(folder, STUDY.replace("seed = 3", 'seed = 3\ntruth = "truth"'))
     run = make_plan(read_study(folder / "study.toml")).runs["unseen"]
     (folder / "truth").mkdir()
-    true = xr.Dataset(
-        {"heave": ("time", run["heave"].values + 0.005)}, {"time": run["time"].values}
-    )
+    time = run["time"].values
+    half = (time[1] - time[0]) / 2
+    finer = time[0] + half * np.arange(-3, 2 * time.size)  # begins before the run
+    heave = np.interp(finer, time, run["heave"].values) + 0.005
+    true = xr.Dataset({"heave": ("time", heave)}, {"time": finer})
     true.to_netcdf(folder / "truth" / "unseen.nc", engine="h5netcdf")
     return run_study(read_study(folder / "study.toml"), folder / "out")
 

@@ -30,7 +30,8 @@ def test_what_is_left_out_is_the_papers():
         "'windows' belongs to scheme = 'hal": {"training": {"scheme": "leave_out", "windows": 3}},
         "'leave_out' belongs to scheme = 'leave_out'": {"training": {"leave_out": "run"}},
         r"densities_of = 'regular' is not a table": {"statistics": {"densities_of": "regular"}},
-        "the name 'a/b' is made of more than letters": {"tests": {"a/b": {}}},
+        "the name 'a/b' must hold a letter or digit, and nothing beside": {"tests": {"a/b": {}}},
+        "the name '_-' must hold a letter or digit": {"tests": {"_-": {}}},
         r"seed: received 18446.* below 2\^64": {"study": {"campaign": "c.toml", "seed": 2**64}},
     }.items(),
 )  # fmt: skip

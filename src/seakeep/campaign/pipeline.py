@@ -174,14 +174,7 @@ class Run:
         stated = getattr(self.own, key)
         if not stated:
             return None
-        start, end = (in_seconds(edge, self.period) for edge in stated)
-        if not start < end:
-            raise RequestError(
-                f"runs.{self.name}.{key}: received [{stated[0]}, {stated[1]}], which with an "
-                f"encounter period of {self.period:.6g} s is [{start:g}, {end:g}]. State the lower "
-                "one first."
-            )
-        return start, end
+        return in_seconds(stated[0], self.period), in_seconds(stated[1], self.period)
 
     @property
     def used_span(self) -> tuple[float, float]:

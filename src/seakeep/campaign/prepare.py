@@ -16,7 +16,7 @@ from seakeep.campaign.pipeline import Run, celerity_of, checked, cropped, resamp
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
-from seakeep.campaign.validation import cross_checks
+from seakeep.campaign.validation import cross_checks, span_mistakes
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded, version
 from seakeep.quality import as_json, judge_runs, warn_of
@@ -245,7 +245,11 @@ class Campaign:
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
-        return survey(self.settings, self.files_of, wanted, channel, progress, failures)
+        surveyed = survey(self.settings, self.files_of, wanted, channel, progress, failures)
+        if surveyed.period:
+            for place, words in span_mistakes(self.settings, surveyed.period):
+                raise RequestError(f"{'.'.join(place)}: {words}")
+        return surveyed
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.

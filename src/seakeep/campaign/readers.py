@@ -249,7 +249,7 @@ def motions_of(column: str) -> Iterator[str]:
     """Canonical motions that the words of a name may mean, the likeliest first."""
     # Of two sensors of one acceleration, neither is the motion of the body; nor is load or wind.
     kinds, words = kinds_of(column), words_of(column)
-    if kinds & {"sides", "load", "beside"}:
+    if kinds & {"sides", "load", "rotor"} or ("flow" in kinds and "motion" not in kinds):
         return
     said = next((f"_{kind}" for kind in ("acceleration", "rate") if kind in kinds), "")
     for motion, known in CALLED["motion"].items():

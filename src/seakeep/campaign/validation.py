@@ -6,7 +6,7 @@ from seakeep.campaign.derivation import needed_channels, sources_of
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings, units_of
 from seakeep.conventions import canonical_channel, conversion
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.toml import Mistake, lengths
+from seakeep.toml import Mistake, in_seconds, lengths
 
 
 def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -49,6 +49,22 @@ def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
                 )
 
 
+def span_mistakes(settings: CampaignSettings, period: float) -> Iterable[Mistake]:
+    """Spans of which one end counts in periods, and which run backwards with a period (s)."""
+    for run, each in settings.runs.items():
+        spans = {"record": each.record, "span": each.span, "train": each.train, "test": each.test}
+        for key, span in spans.items():
+            if span is None:
+                continue
+            start, end = (in_seconds(edge, period) for edge in span)
+            if not start < end:
+                yield (
+                    ("runs", run, key),
+                    f"received [{span[0]}, {span[1]}], which with an encounter period of "
+                    f"{period:.6g} s is [{start:g}, {end:g}]. State the lower one first.",
+                )
+
+
 def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     """Names of channels that the campaign has no channel of."""
     names = settings.channel_names
@@ -71,8 +87,10 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
 def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     """Keys in encounter periods where there is no period, or where it is measured with them."""
     places = list(lengths(settings))
-    wave = settings.wave_channel
-    if not places or settings.campaign.encounter_period:
+    wave, stated = settings.wave_channel, settings.campaign.encounter_period
+    if stated:
+        yield from span_mistakes(settings, stated)
+    if not places or stated:
         return
     if wave is None:
         yield (

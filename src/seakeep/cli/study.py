@@ -131,11 +131,18 @@ def _write_reproduction(
     """Write the pages of the acts, side by side where workers are near, and the one over all."""
     from seakeep.executor import in_order, on_this_machine
     from seakeep.report.acts import write_reproduction
+    from seakeep.report.sections import write_report
 
+    near = on_this_machine(executor)
+    for each in () if near else results.values():
+        with progress_bar(f"Report of {each.attrs['study']}") as tell:
+            write_report(each, tell)
     with progress_bar("Report") as tell:
-        pages = in_order(_write_act, None, [*results.values()], on_this_machine(executor))
-        for done, _ in enumerate(pages, start=1):
-            tell(done, len(results), "pages of the acts")
+        if near:
+            pages = in_order(_write_act, None, [*results.values()], near)
+            for done, name in enumerate(results):
+                tell(done, len(results), f"page of {name}")
+                next(pages)
         return write_reproduction(folder, results, tell)
 
 

@@ -169,12 +169,24 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
 
 def _below_words(rows: list[tuple[int, str]], delimiter: str | None) -> list[tuple[int, str]]:
     """Rows from the header on: the lines right above the numbers that have as many cells."""
-    cells = [_cells(line, delimiter or _delimiter(line)) for _, line in rows[:HEAD]]
-    at = first = next((i for i, each in enumerate(cells) if _numeric(each)), 0)
+    cells = list[list[str]]()
+    for _, line in rows[:HEAD]:
+        cells.append(_cells(line, delimiter or _delimiter(line)))
+        if _numeric(cells[-1]):
+            break
+    else:
+        return rows
+    at = first = len(cells) - 1
     while at and len(cells[at - 1]) == len(cells[first]) and rows[at - 1][0] == rows[at][0] - 1:
         at -= 1
-    is_header = at < first and _units(cells[at], cells[at]) is None
-    return rows[at:] if is_header else rows
+    return rows[at:] if 0 < at < first and _may_head(rows[at][1], cells[at]) else rows
+
+
+def _may_head(line: str, cells: list[str]) -> bool:
+    """Whether a row may be a header: no rule, no units, and no data of which a cell is damaged."""
+    is_data = any(_NUMBER.match(cell) or cell.lower() in _MISSING - {""} for cell in cells)
+    is_units = any(cell.startswith(_OPENED) for cell in cells) or _units(cells, cells) is not None
+    return not (is_data or is_units or _RULE.match(line))
 
 
 def _decimal(path: Path, body: list[str], delimiter: str) -> str:

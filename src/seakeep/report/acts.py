@@ -182,8 +182,8 @@ def _ratio(statistic: Statistic) -> Statistic:
 
 def _against_single(act: Evidence, statistic: Statistic = _median) -> list[Interval]:
     """A statistic of the ensemble over that of the single model, in both measures."""
-    pairs = ((act.cells((), key, model) for model in (ENSEMBLE, SINGLE)) for key in HEADING)
-    return [act.interval(_ratio(statistic), *pair) for pair in pairs]
+    pairs = [(act.cells((), key, ENSEMBLE), act.cells((), key, SINGLE)) for key in HEADING]
+    return [act.interval(_ratio(statistic), ours, other) for ours, other in pairs]
 
 
 def _changes(nrmse: Interval, nammae: Interval) -> str:
@@ -518,9 +518,10 @@ def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
 
 def acts_table(results: Results) -> Table:
     """Median errors of every model of every act, per sea, of wave-frequency and slow channels."""
-    rows, conditions, seas = [], [], []
+    first = next(iter(results.values()))
+    seas = [*map(first.sea_of, first.tests)]
+    rows, conditions = [], []
     for act, result in _played(results):
-        seas = [*map(result.sea_of, result.tests)]
         for model in result.models:
             rows.append((act.letter, model_words(model), *chain(*_pairs(result, model))))
         if words := conditional(result, result.models):

@@ -48,11 +48,11 @@ USES = {
 
 def worth_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the error over the tests beside that of baselines, the look-ahead and the verdict."""
-    ahead = "none. No wave after the instant of the forecast is read."
+    ahead = "none. No input after the instant of the forecast is read."
     if (seconds := float(result["look_ahead"].max())) > 0:
         ahead = (
-            f"the model reads the waves up to {seconds:.3g} s after the instant that it forecasts. "
-            "They must be measured up-wave, or predicted."
+            f"the model reads the inputs up to {seconds:.3g} s after the instant that it "
+            "forecasts. They must be measured up-wave, or predicted."
         )
     points = [*_verdicts(result, checked.repeats), f"Look-ahead: {ahead}"]
     if state := result.attrs["conditional_on"]:

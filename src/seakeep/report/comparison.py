@@ -73,9 +73,9 @@ def _by_channel(
 ) -> Table:
     """A row per channel of a run, and one of averages where columns have it; headings first."""
     run, names = at["run"].values, [*map(str, at["channel"].values)]
-    # Columns without an average end before its row.
-    heads, *rows = zip(["channel", *names, "average"], *columns, strict=False)
-    averages = range(len(names), len(rows))
+    every = [[*column] for column in columns]
+    averages = [len(names)] if len(every[0]) > 1 + len(names) else []
+    heads, *rows = zip(["channel", *names, *["average"] * len(averages)], *every, strict=True)
     return Table(f"{name}_{run}", f"{run}: {title}", heads, rows, note, averages=averages)
 
 
@@ -265,7 +265,7 @@ def forecast_header(states: Sequence[str]) -> str:
 
 
 def look_ahead_words(seconds: float) -> str:
-    """How far a forecast reads the waves, as a clause; empty without a look-ahead."""
+    """How far a forecast reads the inputs, as a clause; empty without a look-ahead."""
     return f"reads the inputs up to {seconds:.3g} s after each instant" if seconds > 0.0 else ""
 
 

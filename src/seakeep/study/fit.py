@@ -110,7 +110,7 @@ def fit_campaign(
         windows (for an ensemble the longest) hold fewer than five periods of a slow motion; of what
         the quality checks found in the model's channels; of tests outside the training (periods,
         heights and steepness of the waves, means of inputs, mean surge); and where the model reads
-        waves after the instant that it forecasts; and of runs that disagree with the others.
+        inputs after the instant that it forecasts; and of runs that disagree with the others.
     """
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
@@ -138,8 +138,8 @@ def fit_campaign(
     latest = max(look_ahead(run, dt) for run in runs.values()) - dt
     if latest > 0.5 * dt:
         warn(
-            f"forecasts of this model read the waves up to {latest:.3g} s after the instant that "
-            "they forecast: it needs these waves ahead of time."
+            f"forecasts of this model read the inputs up to {latest:.3g} s after the instant that "
+            "they forecast: it needs them ahead of time."
         )
     if not settings.inputs and identified.settings.role == "model":
         warn(

@@ -550,7 +550,11 @@ def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
             f"the study names the folder {folder} of true channels, and {path.name} is not in "
             "it. Play the tank again, or leave study.truth out."
         )
-    time, true = plan.runs[run]["time"].values, read_table(path)
+    try:
+        true = read_table(path)
+    except DataError as error:
+        raise DataError(f"{path} cannot be read as true channels. Play the tank again.") from error
+    time = plan.runs[run]["time"].values
     nothing = np.full(time.size, np.nan)
     columns = [
         np.interp(time, true["time"], true[name]) if name in true else nothing

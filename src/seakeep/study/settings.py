@@ -208,10 +208,10 @@ class StudySettings(Table):
             )
         for group in (self.models, self.tests):
             for name in group:
-                if not re.fullmatch(r"[\w-]+", name, re.ASCII):
+                if not re.fullmatch(r"[\w-]*[a-z0-9][\w-]*", name, re.ASCII | re.IGNORECASE):
                     raise ValueError(
-                        f"the name {name!r} is made of more than letters, digits, '_' and '-', "
-                        "and files are named after it; rename it"
+                        f"the name {name!r} must hold a letter or digit, and nothing beside "
+                        "letters, digits, '_' and '-': files are named after it; rename it"
                     )
         return self
 

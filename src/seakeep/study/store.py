@@ -87,6 +87,8 @@ class UnitFolder:
         RequestError
             If the folder holds the results of another study, or of other versions, or cannot be
             made or written.
+        DataError
+            If no header says whose results these are, and their file is damaged.
         StorageError
             If the disk fails.
         """
@@ -94,10 +96,10 @@ class UnitFolder:
         with storing(self.folder):
             units.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=units).close()
-        started = _read_header(header) if header.exists() else None
         if not ((self.folder / RESULT).exists() or any(units.glob("*.nc"))):
             check_report(self.folder)
             return
+        started = self._header()
         if started is None:
             raise RequestError(
                 f"{self.folder} holds results, and {header} does not say of which study. "
@@ -117,6 +119,15 @@ class UnitFolder:
                 f"{self.folder} was started with {', '.join(changed)}; arrays of both would be "
                 "mixed. Give another folder with -o, or remove this one."
             )
+
+    def _header(self) -> dict[str, Any] | None:
+        """Digest and versions that the folder states, in its header or else in its result."""
+        if (self.folder / HEADER).exists():
+            return _read_header(self.folder / HEADER)
+        if not (self.folder / RESULT).exists():
+            return None
+        attrs = read_result(self.folder).attrs
+        return {"digest": attrs["digest"], "versions": json.loads(attrs["versions"])}
 
     def open(self, name: str) -> None:
         """Make the folder this study's, or see that it belongs to it; errors as :meth:`check`."""

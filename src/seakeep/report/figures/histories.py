@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -414,11 +415,10 @@ DRAWN = 50
 """Channels that a picture shows at most, each in a row of its own; the table lists all."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-WELCH = {
-    "paper": ("8.2 s (paper)", COLOURS["forecast"], DASHED),
-    "recommended": ("60 s", COLOURS["ensemble"], "-"),
-}
-"""Segments, colour and dash of a measured spectrum, by how it is estimated."""
+WELCH = {"paper": (COLOURS["forecast"], DASHED), "recommended": (COLOURS["ensemble"], "-")}
+"""Colour and dash of a measured spectrum, by how it is estimated."""
+Spectrum = tuple[FloatArray, FloatArray]
+"""Frequencies and densities."""
 
 
 @figure_style()
@@ -481,31 +481,48 @@ def spectrum_figure(result: StudyResult) -> Figure:
     figure = new_figure(8.5, 4.2)
     axes = figure.subplots()
     known = result.groups.get("nominal", xr.Dataset())
-    for each, dash in zip(known.data_vars.values(), ("-", ":"), strict=False):
-        line = {"color": COLOURS["measured"], "linestyle": dash}
-        axes.plot(known["frequency"], each, label=each.attrs["long_name"], **line)
+    nominal = [
+        (each.attrs["long_name"], (known["frequency"].values, each.values))
+        for each in known.data_vars.values()
+    ]
     # Where no run is irregular the mean over all of them is drawn.
     drawn = runs["run"][runs["waves"] != "regular"]
     of_drawn = spectra.sel(run=drawn if drawn.size else runs["run"])
-    for kind, (length, colour, dash) in WELCH.items():
+    measured = {}
+    for kind, length in (("paper", "8.2 s (paper)"), ("recommended", "60 s")):
         records = entries(of_drawn.sel(kind=kind), "run")
         of_runs = [at.dropna("bin", subset=["density"]) for at in records]
-        curves = [(at["frequency"], at["density"]) for at in of_runs if at["bin"].size]
-        if curves:  # at the frequencies of the first: records differ in length
-            f, _ = curves[0]
-            mean = np.mean([np.interp(f, *curve) for curve in curves], axis=0)
-            words = f"measured, segments of {length}"
-            axes.plot(f, mean, label=words, color=colour, linestyle=dash)
-    regular = np.unique(runs["wave_frequency"].dropna("run").round(3))
-    for number, frequency in enumerate(regular):
-        style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
-        axes.axvline(frequency, **style, label=None if number else "regular waves")
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8)
+        curves = [(at["frequency"].values, at["density"].values) for at in of_runs]
+        measured[kind] = (
+            f"measured, segments of {length}",
+            [each for each in curves if each[0].size],
+        )
+    draw_spectra(axes, nominal, measured, runs["wave_frequency"].dropna("run").values)
     long = spectra.sel(kind="recommended")
     peaks = long["frequency"].where(long["density"] == long["density"].max("bin"))
     axes.set_xlim(0, 2.2 * float(peaks.max().fillna(1.0)))
-    axes.set_ylim(bottom=0)
     channel = plain_text(result.words_of(spectra.attrs["channel"]))
     axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {channel} [m²/Hz]")
     return figure
+
+
+def draw_spectra(
+    axes: Any,
+    nominal: Sequence[tuple[str, Spectrum]],
+    measured: Mapping[str, tuple[str, Sequence[Spectrum]]],
+    regular: FloatArray,
+) -> None:
+    """Draw nominal spectra, the mean of measured ones, and the frequencies of regular waves."""
+    for (label, curve), dash in zip(nominal, cycle("-:"), strict=False):
+        axes.plot(*curve, label=label, color=COLOURS["measured"], linestyle=dash)
+    for kind, (label, curves) in measured.items():
+        if curves:  # at the frequencies of the first: records differ in length
+            f, (colour, dash) = curves[0][0], WELCH[kind]
+            mean = np.mean([np.interp(f, *each) for each in curves], axis=0)
+            axes.plot(f, mean, label=label, color=colour, linestyle=dash)
+    for number, frequency in enumerate(np.unique(regular.round(3))):
+        style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
+        axes.axvline(frequency, **style, label=None if number else "regular waves")
+    axes.set_ylim(bottom=0)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8)

@@ -2,11 +2,11 @@
 
 import base64
 import json
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from seakeep.conventions import displayed, is_elevation
 from seakeep.files import write_text
@@ -105,7 +105,7 @@ def explorer(result: StudyResult) -> Section:
             "training": training,
             "window": window,
             "channel": result.channels.index("heave") if "heave" in result.channels else 0,
-            "cell": _cell(result, test, training, window),
+            "cell": _cells(result, test)(training, window),
         },
     }
     return section("explore", histories=data)
@@ -116,9 +116,9 @@ def write_histories(result: StudyResult) -> None:
     folder = result.folder / "histories"
     folder.mkdir(exist_ok=True)
     for test, data in result.tests.items():
+        cell = _cells(result, test)
         for training, judged in enumerate(data["judged"].values):
-            windows = np.flatnonzero(judged).tolist()
-            cells = {window: _cell(result, test, training, window) for window in windows}
+            cells = {window: cell(training, window) for window in np.flatnonzero(judged).tolist()}
             text = json.dumps(cells, separators=(",", ":"))
             name = f"{test}-{training}"
             write_text(folder / f"{name}.js", f'seakeepCells["{name}"]={text};\n')
@@ -129,29 +129,36 @@ def _elevations(result: StudyResult) -> list[str]:
     return list(filter(is_elevation, result.groups["channels"]["name"].values))
 
 
-def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
-    """A cell, packed: waves, motions, bands and errors."""
-    at, models = result.tests[test].isel(training=training, window=window), {}
+def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any]]:
+    """Packs a cell of a test set, by training set and window: waves, motions, bands, errors."""
+    data, elevations = result.tests[test], _elevations(result)
     units = result.groups["channels"]["units"].sel(name=result.channels).values
-    factors = np.array([displayed(unit)[0] for unit in units])
-
-    def packed(values: xr.DataArray) -> list[dict[str, Any]]:
-        """Values (time, channel) in the units that are shown, packed channel by channel."""
-        return [pack(each) for each in (factors * values.values).T]
-
+    factors = [displayed(unit)[0] for unit in units]
+    series = {}
     for model in judged_models(result):
-        parts = {"mean": at["mean"].sel(model=model)}
+        one, keys = data.sel(model=model, measure="nrmse"), ["mean"]
         if model in result.ensembles:
-            parts |= {key: at[key].sel(ensemble=model) for key in ("lower", "upper")}
-        errors = at["error"].sel(model=model, measure="nrmse").values.tolist()
-        nrmse = [round(e, 3) if e == e else None for e in errors]
-        models[model] = {**{key: packed(each) for key, each in parts.items()}, "nrmse": nrmse}
-    name = at["run"].item()
-    run = result.prepared[name]
-    first = nearest_sample(run["time"].values, at["start"].item(), name) + 1
-    part = slice(first, first + at.sizes["time"])
-    return {
-        "measured": packed(at["measured"]),
-        "waves": [pack(run[each].values[part]) for each in _elevations(result)],
-        "models": models,
-    }
+            one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
+        series[model] = one["error"].values, {key: one[key].values for key in keys}
+
+    def packed(values: npt.NDArray[Any]) -> list[dict[str, Any]]:
+        """Values (time, channel) in the units that are shown, packed channel by channel."""
+        return [pack(factor * values[:, k]) for k, factor in enumerate(factors)]
+
+    def cell(training: int, window: int) -> dict[str, Any]:
+        models = {}
+        for model, (errors, parts) in series.items():
+            nrmse = [round(float(e), 3) if e == e else None for e in errors[training, window]]
+            own = {key: packed(values[training, window]) for key, values in parts.items()}
+            models[model] = {**own, "nrmse": nrmse}
+        name, start = (data[key].values[window] for key in ("run", "start"))
+        run = result.prepared[name]
+        first = nearest_sample(run["time"].values, start, name) + 1
+        part = slice(first, first + data.sizes["time"])
+        return {
+            "measured": packed(data["measured"].values[window]),
+            "waves": [pack(run[each].values[part]) for each in elevations],
+            "models": models,
+        }
+
+    return cell
