@@ -187,6 +187,16 @@ def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(library, model, ma
         assert found.validity & live.conditions.validity & Validity.MEAN
 
 
+def test_a_mean_is_judged_over_two_periods_or_more(library, model, make_run):
+    found, live = Estimator(library, "exact"), model.live()
+    u, y = measured(make_run(COUNT, 5), model, False)
+    for at in range(least := 8 * live.equations["gap"]):
+        found.beside(live, u[at] + [0, 30], y[at])
+    assert not (found.validity | live.conditions.validity) & Validity.MEAN
+    found.beside(live, u[least] + [0, 30], y[least])
+    assert found.validity & live.conditions.validity & Validity.MEAN
+
+
 def test_a_probe_that_stands_still_is_predicted_to(library, model):
     live, found = model.live(), Estimator(library, "exact")
     for at in range(12):

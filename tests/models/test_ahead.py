@@ -171,11 +171,11 @@ def test_where_waves_are_known_nothing_is_weighed(model):
     assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
 
 
-def weigh(parts, claimed, predicted, history=0.0):
+def weigh(parts, claimed, predicted, histories=((0.0,),)):
     """Weigh forecasts of one state, of which training has the mean zero and the variance one."""
-    one, zero = np.ones(1), np.zeros(1)
-    before, nothing = np.full((1, 1, 1), history), np.zeros((1, 1, 1))
-    windows = Windows(9, before, nothing, nothing, predicted=(predicted,))
+    one, zero, count = np.ones(1), np.zeros(1), len(histories)
+    before, nothing = np.array(histories)[..., None], np.zeros((count, 1, 1))
+    windows = Windows(9, before, nothing, nothing, predicted=(predicted,) * count)
     errors = LeadErrors(np.eye(1), np.full((9, 1), claimed))
     weigh_members(windows, parts, errors, Scale(zero, one, one, zero, one))
 
@@ -197,11 +197,12 @@ def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     assert_allclose(parts[0, 0, 0, :, 0], expected)
 
 
-@pytest.mark.parametrize(("history", "expected"), [(-1.0, 0.0), (-3.0, -3.0)])
-def test_a_sea_that_departs_from_training_is_forecast_on(history, expected):
-    parts = np.full((3, 1, 1, 9, 1), -3.0)
-    weigh(parts, 1.2, 0, history)
-    assert_allclose(parts[0, 0, 0, :, 0], expected)
+def test_a_sea_that_departs_from_training_is_forecast_on():
+    # Near the mean, far on one side of it, and far on either side in turn.
+    histories = [[-1.0, -1.0], [-3.0, -3.0], [-3.0, 3.0]]
+    parts = np.full((3, 1, 3, 9, 1), -3.0)
+    weigh(parts, 1.2, 0, histories)
+    assert_allclose(parts[0, 0, :, :, 0], np.repeat([[0.0], [-3.0], [0.0]], 9, axis=1))
 
 
 def test_errors_of_several_models_are_known_as_far_as_those_of_any():

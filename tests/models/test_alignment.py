@@ -7,9 +7,11 @@ import pytest
 import xarray as xr
 from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run, heave_error
 from ensembles import few
+from numpy.testing import assert_array_equal
 from records import table
 
 from seakeep import DataError, HankelDMDc, ProbeAlignment, Uniform, estimate_probe_offset
+from seakeep.models.labelled import Span
 
 
 def spec(alignment):
@@ -48,6 +50,14 @@ def test_a_linear_system_takes_what_the_model_aligned(models, drift):
     state = system.A @ state + system.B @ (table(now, INPUTS) - model.input_mean)
     expected = table(model.forecast(drift, start=60.0, steps=1), STATES)
     np.testing.assert_allclose(system.C @ state + model.state_mean, expected[0], atol=1e-7)
+
+
+@pytest.mark.parametrize("key", ["effective", "dispersion"])
+def test_elevations_are_carried_where_a_span_reads_them_alone(models, drift, key):
+    found = models[key].alignment.carry(drift, [Span(300, 300, 400), Span(600, 600, 650)])
+    read = np.flatnonzero(np.isfinite(found).all(axis=1))
+    assert_array_equal(read, [*range(300, 400), *range(600, 650)])
+    assert_array_equal(read, np.flatnonzero(np.isfinite(found).any(axis=1)))
 
 
 def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(drifts):

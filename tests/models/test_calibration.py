@@ -117,6 +117,10 @@ def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
         scores.append(band_scores(low, high, table(run, STATES)[at + 1 : at + 41]))
     expected = conformal_margin(np.stack(scores), 0.95)
     assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
+    # A part that begins after the first sample that a member read is known by its samples.
+    part = run.isel(time=slice(round(last / DT) - 200, 1100)).assign_attrs(run="part")
+    found = ensemble.calibrate(part, 40).calibration.windows
+    assert found == {"part": after}
 
 
 def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(bands, run):

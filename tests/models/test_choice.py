@@ -8,6 +8,7 @@ from squared import DT, INPUTS, PERIOD, STATES, runs, sea
 
 from seakeep import HankelDMDc, ProbeAlignment, Select, SlowSquares
 from seakeep.models import selection
+from seakeep.models.candidates import Candidates
 from seakeep.models.selection import Trial, groups_of, select, simplest
 
 T = PERIOD * DT
@@ -122,13 +123,17 @@ def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch, count
     monkeypatch.setattr(selection, "_problem", lambda *a: kept.append(problem(*a)) or kept[-1])
     given = {f"{n}": next(iter(runs().values())).assign_attrs(run=f"{n}") for n in range(count)}
     choice = {"vary": ("observables",), "folds": "run", "horizon": (10.0,)}
-    select(replace(SPEC, select=None), given, ["heave"], INPUTS, **choice)
+    found = select(replace(SPEC, select=None), given, ["heave"], INPUTS, **choice)
     (one,) = kept
     assert len(one.read) == (count if count == selection.FEW else 0)
     assert (len(made) == count) == (count == selection.FEW)
     for each in one.read.values():
         for starts, windows, measured in each:
             assert len(windows) == len(starts) == len(measured)
+    # Longer ones are others, which are read anew.
+    longer = 2 * max(one.horizons)
+    judged = [each.predicted.shape for each in one.held_out(found.settings, 1e-3, longer)]
+    assert judged == [(len(one.starts(n, longer)), longer, 1) for n in range(count)]
 
 
 def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
@@ -184,3 +189,12 @@ def test_stated_squares_are_no_look_ahead_that_is_left_out():
     spec = replace(SPEC, observables=(squares,))
     chosen = spec.fit(runs(), STATES, INPUTS).settings.observables
     assert set(chosen) <= {squares}
+
+
+@pytest.mark.parametrize(("ahead", "alike"), [(0.5, True), (0.0, False)])
+def test_stated_squares_that_look_ahead_share_their_columns(ahead, alike):
+    squares = SlowSquares("eta", orders=(0,), lags=(0, 1), lead=ahead)
+    base = replace(SPEC, select=None, alignment=None, lead=6, observables=(squares,))
+    given = runs(), STATES, INPUTS
+    tried = Candidates(base, given, PERIOD, DT, (), ("lead",), unseen=False, rivals=False)
+    assert (tried.columns(base) == tried.columns(replace(base, lead=0))) == alike

@@ -166,6 +166,9 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     summary = ensemble.summarize_windows(run, starts, steps=60)
     expected = seakeep.summarize(together)
     assert_array_equal(table(summary, STATES), table(expected, STATES))
+    one = seakeep.summarize(together.assign_coords(window=[3, 4]).isel(window=1))
+    assert one.window == 4
+    assert_array_equal(table(one, STATES), table(expected, STATES)[1])
 
 
 def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):

@@ -377,7 +377,9 @@ class FittedAlignment:
             wanted[span.first : span.stop] = True
         for begin, end in stretches(np.all(np.isfinite(values), axis=1)):
             read = begin + np.flatnonzero(wanted[begin:end])
-            for column in elevations if read.size else ():
+            if not read.size:
+                continue
+            for column in elevations:
                 series, offset = values[begin:end, column], rig.offsets[column]
                 given = series, dt, (reach[0] + offset, reach[1] + offset)
                 if settings.mode == "effective":

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 import xarray as xr
@@ -24,9 +24,11 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
+from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series
 from seakeep.models.forecasts import reduce_members
 from seakeep.models.inputs import Signature
+from seakeep.models.training import TrainingArrays
 
 Band = Literal["members", "calibrated"]
 BandScale = Literal["spread", "constant", "learnt"]
@@ -56,8 +58,36 @@ class Judged(NamedTuple):
     starts: tuple[float, ...] = ()
 
 
-Case = tuple[Any, xr.Dataset]
-"""An ensemble, whose room imports this one, and a run that it forecasts."""
+class Ensemble(FreeRuns, Protocol):
+    """Members of an ensemble that a calibration uses."""
+
+    @property
+    def arrays(self) -> TrainingArrays:
+        """What the members were trained on."""
+
+    @property
+    def read_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant that members have read, of each run, s."""
+
+    def read_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int,
+        ahead: str = "refuse",
+        name: str = "the run",
+    ) -> Windows:
+        """What forecasts from several starts in one run read."""
+
+    def without(self, run: str) -> Ensemble:
+        """Members as they learn from the other runs."""
+
+    def without_part(self, begin: int, end: int) -> Ensemble:
+        """Members as they learn from the rest of the one run that trains."""
+
+
+Case = tuple[Ensemble, xr.Dataset]
+"""What forecasts a run, and the run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +147,7 @@ class Calibration:
 
 
 def calibrate(
-    ensemble: Any,
+    ensemble: Ensemble,
     runs: labelled.Runs,
     steps: int,
     level: float,
@@ -224,7 +254,9 @@ def held_out(
     dict of str to Judged
         Runs in which there is such a window.
     """
-    free = {name: _free_samples(*case, name, steps) for name, case in cases.items()}
+    free = {
+        name: _free_samples(ensemble, name, run, steps) for name, (ensemble, run) in cases.items()
+    }
     free = {name: places for name, places in free.items() if places}
     judged: dict[str, Judged] = {}
     done, total = 0, sum(cases[name][0].n_members for name in free)
@@ -244,7 +276,7 @@ def held_out(
     return judged
 
 
-def _parts(ensemble: Any, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:
+def _parts(ensemble: Ensemble, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:
     """Thirds of the run that trains alone, and the ensemble as it learns from the rest of it."""
     begin, half = ensemble.arrays.begins[0], 0.5 * ensemble.signature.dt
     edges = np.linspace(0, len(ensemble.arrays.states[0]), PARTS + 1).round().astype(int)
@@ -275,7 +307,7 @@ def _counted(progress: Progress, before: int, total: int, name: str) -> Progress
     return lambda done, _, what: progress(before + done, total, f"{name}, {what}")
 
 
-def _free_samples(ensemble: Any, run: xr.Dataset, name: str, steps: int) -> list[int]:
+def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[int]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
     whole_number(steps, "steps")
     time, signature = np.asarray(run["time"].values, dtype=float), ensemble.signature
@@ -294,7 +326,7 @@ def _free_samples(ensemble: Any, run: xr.Dataset, name: str, steps: int) -> list
     return places
 
 
-def _read_run(ensemble: Any, name: str, run: xr.Dataset) -> str | None:
+def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
     """Which run of the training this is: the one that holds its samples, else that of its name.
 
     A name that was made up for a run without one says nothing.
@@ -306,7 +338,9 @@ def _read_run(ensemble: Any, name: str, run: xr.Dataset) -> str | None:
     return name if name in spans and not labelled.is_made_up(name, run) else None
 
 
-def _holds(run: xr.Dataset, ensemble: Any, name: str, begin: float, states: FloatArray) -> bool:
+def _holds(
+    run: xr.Dataset, ensemble: Ensemble, name: str, begin: float, states: FloatArray
+) -> bool:
     """Whether a run has the same states at the same instants, as far as both reach."""
     time = np.asarray(run["time"].values, dtype=float)
     if not time.size:

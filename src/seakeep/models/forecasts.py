@@ -263,8 +263,9 @@ class Model:
             after the last instant the last input that was read lies, s: negative where it lies
             before. Where input was predicted, the status says ", input predicted from t = … s",
             the first instant that depends on it, which ``attrs["input_predicted_from"]`` holds too.
-            Where waves or drift lie outside the training, it ends in ", outside training", and
-            ``attrs["outside_training"]`` says by how much: period, height, steepness, mean surge.
+            Where waves, means of inputs or drift lie outside the training, it ends in ", outside
+            training", and ``attrs["outside_training"]`` says by how much: period, height,
+            steepness, mean of an input, mean surge.
 
         Raises
         ------
@@ -721,10 +722,9 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
         series = each.values.reshape(*lost.shape, -1, 1)
         values = reduce_members(series, np.where(lost, 0, -1), level)
         values = values.reshape(lost.shape[1], len(STATISTICS), *each.shape[2:])
-        variables[name] = xr.Variable(("window", "statistic", *each.dims[2:]), values, each.attrs)
+        variable = xr.Variable(("window", "statistic", *each.dims[2:]), values, each.attrs)
+        variables[name] = variable if "window" in forecast.dims else variable[0]
     attrs = {"level": level, "members": len(lost), "diverged": int(lost.sum())}
     coords = forecast.drop_dims("member").coords
     summary = xr.Dataset(variables, coords, {**forecast.attrs, **attrs})
-    summary = summary.assign_coords(statistic=statistic_coordinate(level))
-    alone = {} if "window" in forecast.dims else {"window": 0}
-    return summary.isel(alone, missing_dims="ignore")
+    return summary.assign_coords(statistic=statistic_coordinate(level))

@@ -335,9 +335,10 @@ class Live:
 
     @property
     def conditions(self) -> Conditions | None:
-        """Waves and mean surge of the record against the training; None before 4 samples.
+        """Waves, means of inputs and mean surge of the record, and those of training.
 
-        Known and constant inputs are no waves, and are not judged.
+        None before 4 samples. Known and constant inputs are no waves: of them the mean alone is
+        compared.
         """
         taken = self._count.taken
         if taken < 4 or not self.signature.inputs:
@@ -348,13 +349,13 @@ class Live:
 
     @property
     def validity(self) -> Validity:
-        """What lies outside the training: waves, mean surge, or errors of late; or lost waves.
+        """What lies outside the training: waves, means, or errors of late; or lost waves.
 
-        Errors do where :attr:`consistency_by_state` exceeds two for a state, one step ahead or in
-        free runs, and for some samples after a state has jumped. Waves are lost while estimate or
-        forecast go back to any that were not measured, beyond gaps of a quarter of their period,
-        which are closed. While nothing at all is measured they are not: the band holds what they
-        do.
+        Means are those of inputs and of the surge. Errors lie outside where
+        :attr:`consistency_by_state` exceeds two for a state, one step ahead or in free runs, and
+        for some samples after a state has jumped. Waves are lost while estimate or forecast go back
+        to any that were not measured, beyond gaps of a quarter of their period, which are closed.
+        While nothing at all is measured they are not: the band holds what they do.
         """
         return self._validity(self.conditions, self._closed())
 
@@ -744,13 +745,14 @@ class Live:
             those of the estimate, the spread of the members and that of the waves that are not
             known. Where waves are predicted, the mean tends to that of training as ``std`` comes
             near the SD there, and ``std`` to that, so that no lead errs more than the mean. Where
-            waves or mean surge of late lie outside the training, the errors are raised to those of
-            late and by the square of the height; where the consistency of a state exceeds two, its
-            errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
-            lies outside (:class:`seakeep.models.validity.Validity`), beside the numbers and
-            ``trained_`` ones; ``attrs["consistency"]`` is the larger one of each state, at least
-            one. ``attrs["predictable"]`` is the time for which the waves at the probe farthest
-            down-wave are known from the one farthest up-wave, s
+            waves, means of inputs or mean surge of late lie outside the training, the errors are
+            raised to those of late and by the square of the height; where the consistency of a
+            state exceeds two, its errors are raised by it, and its lead time shrinks.
+            ``attrs["validity"]`` names what lies outside
+            (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones;
+            ``attrs["consistency"]`` is the larger one of each state, at least one.
+            ``attrs["predictable"]`` is the time for which the waves at the probe farthest down-wave
+            are known from the one farthest up-wave, s
             (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
 
         Raises
@@ -911,7 +913,11 @@ class Live:
 
     def _parts(self) -> list[FloatArray]:
         """Views of all that samples and forecasts to come read."""
-        parts = [self._known_inputs(name) for name in self._recent]
+        parts = [self._known_inputs(name) for name in ("u", "lost", "x")]
+        # Of regressors those that the next prediction reads; it finds the last row, and its direct
+        # ones, again.
+        first = max(self._pending - 1 - self.signature.input_delays, 0)
+        parts += [self._rows(name, first, self._count.taken) for name in ("y", "delayed")]
         parts += [each for update in self._updates if update for each in update]
         parts += [self._history, self._free, self._innovation, self._squares, self._jumps.memory]
         if self._count.since:  # or it is zero

@@ -9,7 +9,8 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from seakeep.core.solve import Solution
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
 from seakeep.models.inputs import Signature
+from seakeep.models.settings import HankelSettings
 from seakeep.models.training import TrainingData, system_of
 
 
@@ -65,7 +67,7 @@ class Variation:
 
 
 def regress_varying(
-    data: TrainingData, settings: Any, values: Sequence[float]
+    data: TrainingData, settings: HankelSettings, parameter: str, values: Sequence[float]
 ) -> tuple[Solution, TrainingData, Variation]:
     """Regress on the regressors and on q times them.
 
@@ -73,8 +75,10 @@ def regress_varying(
     ----------
     data : TrainingData
         Gathered runs.
-    settings : HankelDMDc
-        With a parameter, and exact delay rows.
+    settings : HankelSettings
+        Exact delay rows.
+    parameter : str
+        Name of the parameter.
     values : sequence of float
         Parameter of each run.
 
@@ -95,7 +99,7 @@ def regress_varying(
     known, counts = np.array(values), np.array([each.columns for each in data.windows])
     if np.ptp(known) == 0:
         raise DataError(
-            f"all runs have {settings.parameter} = {known[0]:g}, so that nothing can be "
+            f"all runs have {parameter} = {known[0]:g}, so that nothing can be "
             "learnt of it. Train on runs at two values or more, or leave parameter out."
         )
     centre = float(np.average(known, weights=counts))
@@ -132,7 +136,7 @@ def regress_varying(
     )
     low, high = float(known.min()), float(known.max())
     variation = Variation(slopes, tuple(shifts), centre, spread, low, high)
-    signature = replace(data.signature.scaled(*scales), parameter=settings.parameter)
+    signature = replace(data.signature.scaled(*scales), parameter=parameter)
     data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
 
@@ -140,10 +144,18 @@ def regress_varying(
 def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
     """Training data of the runs at each value of a parameter."""
     values = [parameter_of(runs[name], parameter, name) for name in data.names]
-    signature, *parts = (getattr(data, each.name) for each in fields(data))
     out = {}
     for value in sorted(set(values)):
-        there = [number for number, each in enumerate(values) if each == value]
-        own = (tuple(part[number] for number in there if part) for part in parts)
-        out[value] = TrainingData(signature, *own)
+        here = [each == value for each in values]
+        out[value] = replace(
+            data,
+            names=tuple(compress(data.names, here)),
+            states=tuple(compress(data.states, here)),
+            delayed=tuple(compress(data.delayed, here)),
+            direct=tuple(compress(data.direct, here)),
+            windows=tuple(compress(data.windows, here)),
+            instants=tuple(compress(data.instants, here)),
+            inputs=tuple(compress(data.inputs, here)),
+            zeros=tuple(compress(data.zeros, here)),
+        )
     return out

@@ -390,7 +390,7 @@ class Problem:
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others."""
-        own = replace(self, horizons=(steps,))
+        own = replace(self, horizons=(steps,))  # which shares what was read and taught
         for run in range(len(self.groups)):
             for predicted, measured, _ in own.free_runs([(candidate, [level])], run):
                 yield Held(run, self.starts(run, steps), predicted[0], measured)
@@ -638,13 +638,17 @@ class Selected(Generic[Chosen]):
 
 
 def settle(
-    settings: Any, runs: Datasets, states: Sequence[str], inputs: Sequence[str], **how: Any
-) -> Selected[Any]:
+    settings: Settings,
+    runs: Datasets,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    **how: Any,
+) -> Selected[Settings]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
-    settings : HankelDMDc
+    settings : HankelSettings
         What was asked for; its ``select`` says what is chosen beside λ, and how.
     runs, states, inputs
         As in :func:`select`.
@@ -663,14 +667,15 @@ def settle(
     """
     lacking = _lacking(settings, (runs, states, inputs))
     without = f"not aligned to the surge: {lacking}" if lacking else ""
-    if not settings.is_open:
+    stated, chosen = not isinstance(settings.ridge, str), getattr(settings, "select", None)
+    if stated and chosen is None:
         return Selected(settings, (), without)
     if settings.ridge == 0:
         raise RequestError(
             "free runs choose at λ above zero, and ridge = 0 is stated. Set ridge = 'rollout', or "
             "remove select."
         )
-    asked, stated = settings.select or Select(), not isinstance(settings.ridge, str)
+    asked = chosen or Select()
     selected = select(
         settings,
         runs,

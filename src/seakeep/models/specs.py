@@ -479,7 +479,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         data = gather(runs, states, inputs, None, self)
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
-            solution, data, variation = regress_varying(data, self, values)
+            solution, data, variation = regress_varying(data, self, self.parameter, values)
             model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
             return replace(model, variation=variation)
         solution = data.regress(self)
@@ -818,16 +818,22 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             series = zip(*departing(zip(*series, strict=True), input_map), strict=True)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
-        x, u, w = (
+        scales = [
             moments(each, group, standardize=False)
             for each, group in zip(series, groups, strict=True)
+        ]
+        signature = Signature(
+            dt=dt,
+            state_labels=labels[0],
+            input_labels=labels[1],
+            state_delays=max(draw.settings.state_reach for draw in every),
+            input_delays=max(draw.settings.input_delays for draw in every),
+            input_map=replace(input_map, reference=shared.centre),
+            state_scale=scales[0],
+            input_scale=scales[1],
+            direct_scale=scales[2],
+            readouts=readouts,
         )
-        reach = (
-            max(draw.settings.state_reach for draw in every),
-            max(draw.settings.input_delays for draw in every),
-        )
-        input_map = replace(input_map, reference=shared.centre)
-        signature = Signature(dt, *labels, *reach, input_map, x, u, w, readouts=readouts)
         return HankelEnsemble(
             settings=shared,
             origin=spec.to_json(),

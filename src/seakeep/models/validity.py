@@ -58,7 +58,7 @@ class Validity(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Waves and mean surge against those of training.
+    """Waves, means of inputs and mean surge against those of training.
 
     Parameters
     ----------

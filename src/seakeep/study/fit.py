@@ -109,8 +109,8 @@ def fit_campaign(
         If the test part of a training run repeats the model's training input, or the training
         windows (for an ensemble the longest) hold fewer than five periods of a slow motion; of what
         the quality checks found in the model's channels; of tests outside the training (periods,
-        heights and steepness of the waves, mean surge); and where the model reads inputs after the
-        instant that it forecasts; and of runs that disagree with the others.
+        heights and steepness of the waves, means of inputs, mean surge); and where the model reads
+        inputs after the instant that it forecasts; and of runs that disagree with the others.
     """
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
