@@ -295,7 +295,7 @@ def _check_alive(executor: Executor) -> None:
         return
     try:
         alive = client.status != "closed" and bool(client.nthreads())
-    except (OSError, TimeoutError, CancelledError):
+    except (OSError, RuntimeError, TimeoutError, CancelledError):  # it may have closed itself
         alive = False
     if not alive:
         raise WorkerLostError(

@@ -187,7 +187,7 @@ def test_a_dask_cluster_gives_the_same_members_and_is_not_waited_for_once_lost(
 
         def client(workers):
             here = {"scheduler_file": str(tmp_path / "here.json"), "set_as_default": False}
-            found = distributed.Client(**here, timeout=30)
+            found = distributed.Client(**here, timeout=15)
             found.wait_for_workers(workers, timeout=300)
             return found
 
