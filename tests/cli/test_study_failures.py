@@ -82,7 +82,7 @@ def a_file(folder):
         (
             with_damaged_truth,
             1,
-            ["unseen.nc cannot be read as true channels. Play the tank again."],
+            ["unseen.nc cannot be read as true channels (", "Play the tank again."],
         ),
         (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
         (a_file, 1, ["results could not be written to", "or choose a folder"]),
