@@ -20,10 +20,10 @@ from seakeep.check.parts import (
     used_parts,
     wave_turns,
 )
-from seakeep.check.response import measured_response, transfer
+from seakeep.check.response import points_of, transfer
 from seakeep.conventions import MOTIONS, canonical_channel
 from seakeep.core.extremes import free_decay
-from seakeep.errors import DataError, RequestError, quiet
+from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.labelled import Span, channel_matrix, mean_period
 from seakeep.models.linear import modes as modes_of
@@ -277,9 +277,8 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     # Offsets of regular runs from the model's rest, per amplitude squared.
     offsets: dict[str, Any] = {}
     if regular := {name: run for name, run in runs.items() if is_regular(run)}:
-        at = measured_response(model, regular)
-        with quiet():  # of runs that are left out it has warned
-            parts = used_parts(model, regular)
+        parts = used_parts(model, regular)
+        at = points_of(model, regular, parts)
         used = [parts[str(run)].inputs for run in at["run"].values]
         calm = [np.where(waves, 0.0, each.mean(axis=0)) for each in used]
         columns = np.stack([_columns(single, each[None])[0] for each in calm])

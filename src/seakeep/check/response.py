@@ -215,8 +215,12 @@ def measured_response(model: Model, runs: Datasets) -> xr.Dataset:
     SeakeepWarning
         Of each run that gives none, with the reason.
     """
+    return points_of(model, runs, used_parts(model, runs))
+
+
+def points_of(model: Model, runs: Datasets, parts: dict[str, Part]) -> xr.Dataset:
+    """Measured response in the used parts of runs."""
     reference = reference_probe(model, runs)
-    parts = used_parts(model, runs)
     pieces = [part for part in parts.values() if not is_regular(part.run)]
     names = [name for name, part in parts.items() if is_regular(part.run)]
 
