@@ -41,6 +41,7 @@ CHANGES = {
         ("time = origin + dt * np.arange(first, last + 1)", "time = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
         ("rtol=1e-6, atol=0), np.nan", "rtol=0, atol=0), np.nan", "campaign/test_prepare.py::test_a_number_for_no_reading_is_a_gap_of_channels_alone"),
         ("in_seconds(own.window, period)", "in_seconds(own.window, 1.0)", "campaign/test_steps.py::test_clocks_from_signals"),
+        ("find(series, time - near,", "find(series, time,", "campaign/test_steps.py::test_clocks_from_signals"),
         ("].reference(logger.time)", "].reading(logger.time)", "campaign/test_steps.py::test_clocks_from_signals"),
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
@@ -555,6 +556,10 @@ CHANGES = {
     "signals/synchronisation.py": [
         ("_line(instants + lags.lag[good], instants,", "_line(instants - lags.lag[good], instants,", "campaign/test_steps.py::test_clocks_from_signals"),
         ("offset = level - drift * centre", "offset = level + drift * centre", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
+        (" & (np.abs(lags.lag) < largest_lag)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        ("LARGEST_SCATTER = 1 / 12", "LARGEST_SCATTER = 4.0", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        ("alike < LEAST_SHARED or ", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        (" or abs(rate - 1) > max(LARGEST_DRIFT, 2.0 * drift_error)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
         ("math.sqrt(2) * getattr(clock, key)", "getattr(clock, key)", "signals/test_synchronisation.py::test_windows_that_share_a_half_are_not_counted_twice"),
         ("low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series", "series", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
     ],

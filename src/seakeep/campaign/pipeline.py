@@ -229,6 +229,7 @@ def sync(run: Run) -> Run:
 
 def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
     own, period = run.settings.instruments[logger.name], run.period
+    near = own.offset or 0.0
     if own.trigger is not None:
         theirs = run.settings.instruments[reference.name].trigger
         if theirs is None:
@@ -237,21 +238,21 @@ def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
                 f"trigger = 'COLUMN' to [instruments.{reference.name}]."
             )
         return clock_from_pulses(
-            logger.column(own.trigger), logger.time, reference.column(theirs), reference.time,
-            own.offset or 0.0,
+            logger.column(own.trigger), logger.time, reference.column(theirs), reference.time, near
         )  # fmt: skip
     pair = own.shared or own.correlated
     if not pair:
         stated = own.offset is not None or own.drift is not None
         method = "as stated" if stated else ASSUMED
-        return Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0), method=method)
+        return Clock(near, 1e-6 * (own.drift or 0.0), method=method)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])
     if not np.ptp(series) or not np.ptp(other):
         raise DataError(f"'{pair[0]}' or '{pair[1]}' is constant. Choose signals that move.")
     find = clock_from_shared if own.shared else clock_from_correlation
     window, largest_lag = in_seconds(own.window, period), in_seconds(own.largest_lag, period)
-    return find(series, time, other, instants, window, largest_lag)
+    clock = find(series, time - near, other, instants, window, largest_lag)
+    return replace(clock, offset=near + clock.offset)
 
 
 def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
