@@ -42,6 +42,7 @@ CHANGES = {
         ("rtol=1e-6, atol=0), np.nan", "rtol=0, atol=0), np.nan", "campaign/test_prepare.py::test_a_number_for_no_reading_is_a_gap_of_channels_alone"),
         ("in_seconds(own.window, period)", "in_seconds(own.window, 1.0)", "campaign/test_steps.py::test_clocks_from_signals"),
         ("find(series, time - near,", "find(series, time,", "campaign/test_steps.py::test_clocks_from_signals"),
+        ("find_held(own, step)", "find_held(x, step)", "campaign/test_steps.py::test_a_sensor_that_sticks_is_reported_in_times_that_jitter"),
         ("].reference(logger.time)", "].reading(logger.time)", "campaign/test_steps.py::test_clocks_from_signals"),
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],

@@ -10,6 +10,7 @@ from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep.campaign import read_campaign
+from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 
 AXES, G = ("surge", "sway", "heave"), 9.81
@@ -210,6 +211,16 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0", spans)
     assert run.attrs["celerity"] == pytest.approx(2.0, rel=1e-3)
     assert "celerity" not in two_probes(tmp_path, "eta_a = 4.0\neta_b = 4.0").attrs
+
+
+def test_a_sensor_that_sticks_is_reported_in_times_that_jitter(tmp_path):
+    t, rng = np.arange(0, 120, 0.05), np.random.default_rng(0)
+    x = 0.05 * np.sin(2 * np.pi * 0.38 * t)
+    x[1000:1040] = x[1000]
+    text = "[channels.eta_a]\n[preparation]\njitter = 'interpolate'\nsampling_rate = 10\n"
+    run = prepared(tmp_path, {"eta_a [m]": x}, text, t + 6e-4 * rng.uniform(-1, 1, t.size))
+    (stuck,) = [each for each in findings_of(run) if each.kind.word == "stuck"]
+    assert stuck.details["samples"] == 40
 
 
 WANDER = sea(5, (0.2, 1.0)).at  # without a period of its own, so that a lag is unique

@@ -28,7 +28,8 @@ def noisy():
 
 
 def recorded(x):
-    group = flag_samples(record(DT, heave=x), PreparationSettings())
+    data = record(DT, heave=x)
+    group = flag_samples(data, PreparationSettings(), data)
     return Record("r", group, {"": group})
 
 

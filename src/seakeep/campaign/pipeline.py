@@ -361,8 +361,8 @@ def cleaned(run: Run) -> Run:
         logger = run.loggers[key]
         if preparation.gaps == "refuse":
             _refuse_gaps(data, run.name, logger.path)
-        data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
-        groups[key] = data = flag_samples(data, preparation)
+        data, read = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
+        groups[key] = data = flag_samples(data, preparation, read)
         if logger.options.sampling_rate and logger.options.time is None:
             step = time_step_of(logger.columns, time_column(logger.columns))
             if step:  # the step of the file's times, where a stated rate is used
@@ -396,12 +396,14 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
     )
 
 
-def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:
-    """Put the channels on a uniform axis, where that is allowed."""
+def _regular(
+    data: xr.Dataset, preparation: PreparationSettings, name: str
+) -> tuple[xr.Dataset, xr.Dataset]:
+    """Put the channels on a uniform axis, where that is allowed; and, there, what was read."""
     time = data["time"].values
     try:
         uniform_step(time, name)
-        return data
+        return data, data
     except DataError as error:
         report, mend = inspect_times(time, name), ""
         if report.gaps and preparation.gaps == "refuse":
@@ -412,19 +414,30 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
             raise DataError(f"{error} Or state {mend} in [preparation].") from None
     series = np.column_stack([each.values for each in data.values()])
     new, values = onto_uniform(time, series, name)
-    variables = {
-        str(n): ("time", values[:, i], each.attrs) for i, (n, each) in enumerate(data.items())
-    }
+    read = np.full_like(values, np.nan)
+    read[report.place] = series
     done = {
         "time_gaps": len(report.gaps),
         "time_missing": report.missing,
         "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
     }
-    return xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
+
+    def on_grid(values: FloatArray) -> xr.Dataset:
+        variables = {
+            str(n): ("time", values[:, i], each.attrs) for i, (n, each) in enumerate(data.items())
+        }
+        return xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
+
+    return on_grid(values), on_grid(read)
 
 
-def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
-    """Fill gaps, so that filters can run, and flag what was filled and what looks wrong."""
+def flag_samples(
+    data: xr.Dataset, preparation: PreparationSettings, read: xr.Dataset
+) -> xr.Dataset:
+    """Fill gaps, so that filters can run, and flag what was filled and what looks wrong.
+
+    Interpolation makes equal readings differ: whether a sensor is stuck is judged by what was read.
+    """
     step = usual_step(data["time"].values)
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
@@ -437,13 +450,14 @@ def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Datas
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
         if x.size >= 16 and np.ptp(x):
-            if np.isfinite(reading := reading_step(x)):
+            own = np.where(np.isfinite(read[name]), read[name], x)
+            if np.isfinite(reading := reading_step(own)):
                 known["reading_step"] = reading
             there = flags == 0
-            stuck = find_held(x, step) & there
+            stuck = find_held(own, step) & there
             for start, end in stretches(stuck):  # what stands before a gap that was filled
                 stuck[start:end] = end - start > 2
-            outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
+            outlier, edge = find_outliers(x) & there & ~stuck, saturated(own, stuck)
             flags[outlier] |= OUTLIER
             flags[edge] |= SATURATED
             flags[stuck & ~edge] |= STUCK

@@ -260,6 +260,8 @@ class TimeReport:
         Distance of the instants from the grid, s.
     jittered : bool
         Whether that is more than a hundredth of a step and than the decimals explain.
+    place : ndarray of int
+        Instant of the grid that each stands for.
 
     Examples
     --------
@@ -273,6 +275,7 @@ class TimeReport:
     gaps: tuple[tuple[float, float], ...]
     jitter_rms: float
     jittered: bool
+    place: IntArray
 
     @property
     def uniform(self) -> bool:
@@ -311,6 +314,7 @@ def inspect_times(time: ArrayLike, name: str = "the run") -> TimeReport:
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
         jitter_rms=math.sqrt(np.mean(away**2)),
         jittered=bool(np.abs(away).max() > _tolerance(t, step)),
+        place=place,
     )
 
 
