@@ -32,6 +32,7 @@ CHANGES = {
     "campaign/guesses.py": [
         ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
         ("noise_share(series) > 0.5", "noise_share(series) > 2", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
+        ('if "range" not in kinds:', 'if kinds:', "campaign/test_drafts.py::test_guesses"),
         ('"time" in kinds_of(column) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
     ],
     "campaign/pipeline.py": [
@@ -563,6 +564,9 @@ CHANGES = {
         (" or abs(rate - 1) > max(LARGEST_DRIFT, 2.0 * drift_error)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
         ("math.sqrt(2) * getattr(clock, key)", "getattr(clock, key)", "signals/test_synchronisation.py::test_windows_that_share_a_half_are_not_counted_twice"),
         ("low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series", "series", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
+    ],
+    "quality/sensors.py": [
+        (' and noise_share(sound(run, name)) <= 0.5', '', "campaign/test_positions.py::test_still_water_and_noise_place_no_probes"),
     ],
     "signals/time_axis.py": [
         ("steps[steps < 1.5 * np.median(steps)].mean()", "np.median(steps)", "signals/test_gaps.py::test_rounding_of_times_does_not_add_up_over_a_long_gap"),

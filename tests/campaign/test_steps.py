@@ -206,6 +206,7 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     # A parabola through three samples of a sine of 26 samples a period: some 1e-3 of a step.
     run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0")
     assert run.attrs["celerity"] == pytest.approx(2.0, rel=1e-3)
+    assert run.attrs["celerity_correlation"] == pytest.approx(1.0, abs=1e-3)
     # The start-up is used by none: what lies before the spans decides nothing.
     spans = "train = [61, 90]\ntest = [90, 119]"
     run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0", spans)

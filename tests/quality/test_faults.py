@@ -28,8 +28,7 @@ def noisy():
 
 
 def recorded(x):
-    data = record(DT, heave=x)
-    group = flag_samples(data, PreparationSettings(), data)
+    group = flag_samples(record(DT, heave=x), PreparationSettings(), {})
     return Record("r", group, {"": group})
 
 

@@ -398,12 +398,12 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
 
 def _regular(
     data: xr.Dataset, preparation: PreparationSettings, name: str
-) -> tuple[xr.Dataset, xr.Dataset]:
-    """Put the channels on a uniform axis, where that is allowed; and, there, what was read."""
+) -> tuple[xr.Dataset, dict[str, FloatArray]]:
+    """Put channels on a uniform axis, where that is allowed; and what was read, if it differs."""
     time = data["time"].values
     try:
         uniform_step(time, name)
-        return data, data
+        return data, {}
     except DataError as error:
         report, mend = inspect_times(time, name), ""
         if report.gaps and preparation.gaps == "refuse":
@@ -422,17 +422,14 @@ def _regular(
         "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
     }
 
-    def on_grid(values: FloatArray) -> xr.Dataset:
-        variables = {
-            str(n): ("time", values[:, i], each.attrs) for i, (n, each) in enumerate(data.items())
-        }
-        return xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
-
-    return on_grid(values), on_grid(read)
+    names = [str(name) for name in data]
+    variables = {n: ("time", x, data[n].attrs) for n, x in zip(names, values.T, strict=True)}
+    uniform = xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
+    return uniform, dict(zip(names, read.T, strict=True))
 
 
 def flag_samples(
-    data: xr.Dataset, preparation: PreparationSettings, read: xr.Dataset
+    data: xr.Dataset, preparation: PreparationSettings, read: Mapping[str, FloatArray]
 ) -> xr.Dataset:
     """Fill gaps, so that filters can run, and flag what was filled and what looks wrong.
 
@@ -450,7 +447,8 @@ def flag_samples(
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
         if x.size >= 16 and np.ptp(x):
-            own = np.where(np.isfinite(read[name]), read[name], x)
+            own = read.get(str(name), x)
+            own = np.where(np.isfinite(own), own, x)
             if np.isfinite(reading := reading_step(own)):
                 known["reading_step"] = reading
             there = flags == 0
@@ -697,15 +695,16 @@ def _part(
     raise RequestError(f"{lacks}. Lengthen the span, or move it into the run's {common}.")
 
 
-def celerity_of(run: Run, dt: float) -> float | None:
-    """Effective celerity of the waves in the part of a run that is used, m/s; None if unknown."""
+def celerity_of(run: Run, dt: float) -> dict[str, float]:
+    """Effective celerity of the waves in the part of a run that is used, m/s; and correlation."""
     channels, rig = run.settings.celerity_channels, run.settings.rig
     if channels is None or rig.water_depth is None:
-        return None
+        return {}
     apart = rig.positions[channels[1]] - rig.positions[channels[0]]
     try:
         used = inside(run.data["time"].values, run.used_span, dt)
         first, last = (run.data[name].values[used] for name in channels)
-        return effective_celerity(first, last, dt, apart, rig.water_depth).celerity
+        found = effective_celerity(first, last, dt, apart, rig.water_depth)
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
-        return None
+        return {}
+    return {"celerity": found.celerity, "celerity_correlation": found.correlation}

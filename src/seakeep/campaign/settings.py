@@ -55,7 +55,8 @@ class RigSettings(Table):
     """``[rig]``: the basin and where things stand in it."""
 
     water_depth: Annotated[float, AfterValidator(_depth)] | None = optional(
-        "water depth in metres; inf, without quotes, for deep water"
+        "water depth in metres; inf, without quotes, for deep water; left out at forward speed, "
+        "where linear dispersion does not hold"
     )
     wave_direction: Finite | None = optional(
         "direction in which the waves run, degrees from the x axis"
