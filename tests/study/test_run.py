@@ -17,7 +17,7 @@ from seakeep.study import read_study, run_study
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
-from seakeep.study.store import LOCK, RESULT, RESULT, UNITS, UnitFolder
+from seakeep.study.store import LOCK, RESULT, UNITS, UnitFolder
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -141,11 +141,14 @@ def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_pa
         UnitFolder(tmp_path, study.digest).check()
 
 
-@pytest.mark.parametrize("result", [f"{UNITS}/one.nc", RESULT])
-def test_results_that_name_no_study_are_not_overwritten(result, tmp_path):
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [(f"{UNITS}/one.nc", "does not say of which study"), (RESULT, "it has no checksum")],
+)
+def test_results_that_name_no_study_are_not_overwritten(result, words, tmp_path):
     (tmp_path / UNITS).mkdir()
     (tmp_path / result).write_bytes(b"")
-    with pytest.raises(RequestError, match=r"holds results, and .* does not say of which study"):
+    with pytest.raises((RequestError, DataError), match=words):
         UnitFolder(tmp_path, "one").open("first")
 
 
