@@ -247,6 +247,7 @@ CHANGES = {
         ("np.arange(z, -1, -1)]", "np.arange(z + 1)]", "hosts/test_onnx.py::test_a_horizon_is_that_of_forecast_arrays"),
     ],
     "hosts/templates/estimator.c": [
+        ("k * (1.0 / size)", "(double)k / size", "hosts/test_estimator.py::test_a_record_that_stands_still_or_whose_order_is_half_is_predicted_to"),
         ("if (size > 8 * GAP && (mean", "if ((mean", "hosts/test_estimator.py::test_a_mean_is_judged_over_two_periods_or_more"),
         ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
         ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),

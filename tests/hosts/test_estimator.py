@@ -197,11 +197,17 @@ def test_a_mean_is_judged_over_two_periods_or_more(library, model, make_run):
     assert found.validity & live.conditions.validity & Validity.MEAN
 
 
-def test_a_probe_that_stands_still_is_predicted_to(library, model):
+def tone():
+    """24 periods in 117 samples: four are 19.5 samples, which rounding may take to 19 or 20."""
+    noise = np.random.default_rng(0).standard_normal(117)
+    return np.cos(2 * np.pi * 24 / 117 * np.arange(117)) + 0.1 * noise
+
+
+@pytest.mark.parametrize("record", [np.full(8, 0.25), tone()])  # of 0.25 no rounding hides 0/0
+def test_a_record_that_stands_still_or_whose_order_is_half_is_predicted_to(library, model, record):
     live, found = model.live(), Estimator(library, "exact")
-    for at in range(12):
-        u = np.full(2, 0.25 if at < 8 else np.nan)  # no rounding hides 0/0
-        found.beside(live, u, np.full(2, 0.1 * at))
+    for at, wave in enumerate(np.append(record, np.full(4, np.nan))):
+        found.beside(live, np.full(2, wave), np.full(2, 0.1 * at))
     last = found.beside(live, np.zeros(2), np.full(2, np.nan))  # reads what was predicted
     assert_allclose(*last, rtol=0, atol=1e-12)
 

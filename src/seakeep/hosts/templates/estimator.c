@@ -186,7 +186,7 @@ static double median_frequency(const double *series, int size)
         }
         grown += one * one + two * two - rate * one * two;
         if (grown >= total)
-            return (double)k / size;
+            return k * (1.0 / size); /* rounded as in NumPy: orders may lie at halves */
     }
     return 0.5;
 }
