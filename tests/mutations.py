@@ -253,6 +253,9 @@ CHANGES = {
         ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("row[k] += last[c] * on_states[c * M + k];", "row[k] += 0.0;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
     ],
+    "hosts/templates/fmi2.c": [
+        ("fabs(time - state->next)", "(state->next - time)", "hosts/test_fmu.py::test_a_step_that_does_not_follow_on_the_last_is_refused"),
+    ],
     "metrics.py": [
         ("own = [_block(p, m) for p, m, _ in cases]", "own = [max(_block(p, m) for p, m, _ in cases)] * len(cases)", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
         ("np.roll(of[0], k, axis=-1)", "of[0]", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
