@@ -91,30 +91,25 @@ def test_a_step_is_the_equation():
         return recursion(models, place, *given)
 
     found, used = run(slice(3), slice(2), forcing)
-    for model in range(3):
-        for window in range(2):
-            x, u = list(histories[model, window]), list(delayed[window])
-            for step in range(steps):
-                surge = [offset[model] + gain[model] * each[1] for each in x[-P:]]
-                here = min(max(np.mean(surge), -1.0), 1.0)
-                row = [
-                    np.interp(here, place.grid, table[starts[window] + step, :, column])
-                    for column in range(n)
-                ]
-                u.append(np.array(row))
-                following = (
-                    a[model] @ np.concatenate(x[: -s - 2 : -1])
-                    + b[model] @ np.concatenate(u[: -z - 2 : -1])
-                    + d[model, :, 0] * (here - 0.1) ** 2
-                    + forcing[model, window, step]
-                )
-                x.append(following)
-            # One window of one model runs by numbers, not by arrays.
-            alone = run(slice(model, model + 1), slice(window, window + 1), forcing)
-            one = [each[0, 0] for each in alone]
-            for states, inputs in ((found[model, window], used[model, window]), one):
-                assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
-                assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
+    for model, window in np.ndindex(3, 2):
+        x, u = list(histories[model, window]), list(delayed[window])
+        for step in range(steps):
+            surge = offset[model] + gain[model] * np.array(x[-P:])[:, 1]
+            here = np.clip(surge.mean(), -1.0, 1.0)
+            waves = table[starts[window] + step].T
+            u.append(np.array([np.interp(here, place.grid, each) for each in waves]))
+            x.append(
+                a[model] @ np.concatenate(x[: -s - 2 : -1])
+                + b[model] @ np.concatenate(u[: -z - 2 : -1])
+                + d[model, :, 0] * (here - 0.1) ** 2
+                + forcing[model, window, step]
+            )
+        # One window of one model runs by numbers, not by arrays.
+        alone = run(slice(model, model + 1), slice(window, window + 1), forcing)
+        one = [each[0, 0] for each in alone]
+        for states, inputs in ((found[model, window], used[model, window]), one):
+            assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
+            assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
     lost = np.where(np.arange(steps)[:, None] < 20, forcing, np.nan)
     for of in (slice(1), slice(3)):  # a run that is lost stays so, and keeps a place
         one, driven = run(of, slice(1), lost)

@@ -34,14 +34,6 @@ def test_moments_are_those_of_the_windows_pooled_with_ddof_one(make_run, channel
         assert_allclose(std, pooled.std(axis=0, ddof=1), rtol=1e-13)
 
 
-def test_ridge_per_snapshot_is_ridge_times_the_columns_of_all_runs(make_run, channels):
-    runs = [make_run(seed=seed) for seed in range(2)]
-    model = HankelDMDc(3, 8, 0.2, ridge_scale="per_snapshot").fit(runs, **channels)
-    assert model.training.columns == (391, 391)
-    same = HankelDMDc(3, 8, 0.2 * 782).fit(runs, **channels)
-    assert_array_equal(model.A, same.A)
-
-
 def test_a_rank_takes_the_place_of_ridge(run, channels):
     model = HankelDMDc(3, 8, 0.0, rank=5).fit(run, **channels)
     assert (model.training.rank, model.training.method, model.training.ridge) == (5, "svd", 0.0)

@@ -59,15 +59,16 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, d
     # Ridge enough for a stable model: an unstable one would compare rounding of large numbers.
     model = fit(run, s, z, ridge=2.0, delay_rows=delay_rows, standardize=True)
     start, steps = 100, 150
-    instant = float(run.time[start])
-    deviations = table(run, INPUTS)[start : start + steps + 1] - model.input_mean
+    x, u = table(run, STATES), table(run, INPUTS)
+    state = model.initial_state_arrays(x[: start + 1], u[: start + 1])
     system = model.to_state_space()
     assert system.dt == model.dt
     assert len(system.A) == 2 * (s + 1) + 2 * z
-    _, output, _ = signal.dlsim(system, deviations, x0=model.initial_state(run, start=instant))
-    physical, forecast = output + model.state_mean, model.forecast(run, start=instant, steps=steps)
+    deviations = u[start : start + steps + 1] - model.input_mean
+    physical = signal.dlsim(system, deviations, x0=state)[1] + model.state_mean
+    forecast = model.forecast(run, start=float(run.time[start]), steps=steps)
     # The first output is the measured state at the start; values are of order one.
-    assert_allclose(physical[0], table(run, STATES)[start], rtol=0, atol=1e-12)
+    assert_allclose(physical[0], x[start], rtol=0, atol=1e-12)
     assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
 
 
