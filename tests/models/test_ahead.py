@@ -18,11 +18,8 @@ from seakeep.models.inputs import Scale
 from seakeep.signals.prediction import foresee
 
 START, STEPS, LEAD = 20.0, 40, 6
-
-
-def model_of(drifts, **settings):
-    spec = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, **settings)
-    return spec.fit(drifts, STATES, INPUTS)
+SPEC = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD)
+OWN_MEANS = replace(SPEC, centre="run")
 
 
 @pytest.fixture(scope="module", params=["plain", "aligned", "observed"])
@@ -32,7 +29,7 @@ def model(request, drifts):
         "aligned": {"alignment": FOLLOWED},
         "observed": {"alignment": FOLLOWED, "observables": (SQUARES,)},
     }
-    return model_of(drifts, **settings[request.param])
+    return replace(SPEC, **settings[request.param]).fit(drifts, STATES, INPUTS)
 
 
 def up_to(run, last):
@@ -87,7 +84,7 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
 
 
 def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift):
-    model = model_of(drifts)
+    model = SPEC.fit(drifts, STATES, INPUTS)
     last = reads_until(model, drift) - 10
     short = up_to(drift, last)
     found = model.forecast(short, START, STEPS, ahead="predict")
@@ -132,14 +129,11 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     assert np.all(np.ptp(every[:, -1], axis=0) > 0)  # a band stays where waves are predicted
 
 
-OWN_MEANS = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, centre="run")
-
-
 @pytest.mark.parametrize(
     ("spec", "positions"),
     [
-        (HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD), True),
-        (HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD), False),
+        (SPEC, True),
+        (SPEC, False),
         (Subspace(4, 12, 1e-3, order=6, lead=LEAD), True),
         (OWN_MEANS, True),
         (replace(OWN_MEANS, alignment=FOLLOWED), True),
@@ -228,7 +222,7 @@ def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
 
 
 def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):
-    model, at, steps = model_of(drifts), 400, 250
+    model, at, steps = SPEC.fit(drifts, STATES, INPUTS), 400, 250
     # Waves are known for longer than a forecast without them is trusted.
     start, last = float(drift.time[at]), at + 100
     short = unplaced(up_to(drift, last))

@@ -69,6 +69,8 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
         live.step(u[at], x[at])
     mean, std, *_ = table(live.forecast(120, u[now:]), STATES)
     assert_allclose(mean, expected, **close)
+    one_step = table(single.forecast(unseen, 64.6, 1), STATES)[0]
+    assert_allclose(live.innovation, x[now - 4] - one_step, **close)  # three wait for waves ahead
     assert np.all(std > single.errors.at(np.arange(1, 121)))  # the members' spread comes on top
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
     two = settings.fit({name: runs[name] for name in "ac"}, STATES, INPUTS)

@@ -18,7 +18,6 @@ from seakeep import (
     Uniform,
     load_model,
 )
-from seakeep.models.alignment import FittedAlignment
 
 T = PERIOD * DT
 SHORT = Select(observables=True, horizon=10, period=T)
@@ -103,35 +102,30 @@ def test_regular_runs_train_beside_irregular_ones_and_help_in_waves_like_theirs(
     assert errors[1] < 0.5 * errors[0]
 
 
-def rig(run, depth, position):
-    run = run.rename(drift="surge").assign_attrs(encounter_period=T)
-    if depth is not None:
-        run.attrs["water_depth"] = depth
-    if position is not None:
-        run["eta"].attrs["x_position"] = position
-    return run
-
-
 @pytest.mark.parametrize(
-    ("depth", "position", "missing"),
-    [
-        (2.0, -1.0, ""),
-        (None, -1.0, "the runs state no water depth"),
-        (2.0, None, "the run states no position of a wave probe"),
-    ],
+    ("unknown", "missing"),
+    {
+        "": "",
+        "depth": "the runs state no water depth",
+        "position": "the run states no position of a wave probe",
+    }.items(),
 )
-def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(depth, position, missing):
-    given, channels = {"the run": rig(sea(0), depth, position)}, (["heave", "surge"], ["eta"])
+def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(unknown, missing):
+    run = sea(0).rename(drift="surge").assign_attrs(water_depth=2.0)
+    run["eta"].attrs["x_position"] = -1.0
+    if unknown == "depth":
+        del run.attrs["water_depth"]
+    if unknown == "position":
+        del run["eta"].attrs["x_position"]
+    given = {"the run": run}, ["heave", "surge"], ["eta"]
     alignment = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
-    assert alignment.missing(given, *channels) == missing
+    assert alignment.missing(*given) == missing
     spec = HankelDMDc(6, 12, 1.0, delay_rows="exact", alignment=alignment, lead=8)
-    model = spec.fit(given, *channels)
-    if depth is None:
-        assert model.alignment is None
-    else:
-        assert isinstance(model.alignment, FittedAlignment)
+    model = spec.fit(*given)
+    if unknown != "depth":
         assert model.alignment.settings.surge == ("none" if missing else "predicted")
-    needed = dataclasses.replace(spec, alignment=dataclasses.replace(alignment, optional=False))
-    if depth is None:
-        with pytest.raises(RequestError, match="needs the water depth"):
-            needed.fit(given, *channels)
+        return
+    assert model.alignment is None
+    needed = dataclasses.replace(alignment, optional=False)
+    with pytest.raises(RequestError, match="needs the water depth"):
+        dataclasses.replace(spec, alignment=needed).fit(*given)

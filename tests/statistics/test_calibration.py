@@ -16,10 +16,16 @@ from seakeep.models.calibration import Judged, learn_margin
 from seakeep.statistics import band_scores, conformal_margin
 
 
-def test_the_coverage_of_exchangeable_scores_is_that_of_the_order_statistic():
+def test_margins_by_hand():
     """Rank ⌈0.9 · 40⌉ of 39: a new score is below it with probability 36/40."""
     scores = np.arange(1.0, 40.0).reshape(1, 39, 1)
-    assert conformal_margin(scores, 0.9, block_length=1).margin[0] == 36.0
+    assert conformal_margin(scores, 0.9, block_length=1).margin == [36.0]
+    # Few blocks warrant less, and give the largest score.
+    few = conformal_margin(scores[:, :12].reshape(2, 6, 1), 0.95, block_length=6)
+    assert (few.margin, few.blocks) == ([12.0], [2])
+    assert few.warranted == pytest.approx([2 / 3])
+    # A band is never narrowed.
+    assert conformal_margin(-scores, 0.9).margin == [0.0]
 
 
 def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
@@ -95,19 +101,6 @@ def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
     assert np.isinf(scores[1]).all()
     # Neither error nor scale: a channel that never moves.
     assert scaled_scores(y * 0, y * 0, y * 0).max() == 0.0
-
-
-def test_few_blocks_warrant_less_and_give_the_largest_score():
-    scores = np.arange(12.0).reshape(2, 6, 1)
-    found = conformal_margin(scores, 0.95, block_length=6)
-    assert found.margin[0] == 11.0
-    assert found.blocks[0] == 2
-    assert found.warranted[0] == pytest.approx(2 / 3)
-
-
-def test_a_band_is_never_narrowed():
-    scores = np.full((4, 50, 1), -1.0) - np.arange(50.0)[:, None]
-    assert conformal_margin(scores, 0.9).margin[0] == 0.0
 
 
 def test_scores_by_hand_and_a_band_that_is_lost():
