@@ -45,7 +45,8 @@ def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
     windows = model.read_windows(run, [60.0, 80.0], 50)
     assert windows.delayed.shape == (2, 40 + 50, 6)
     found = envelope_of(model.signature, windows)
-    still = run.assign(surge=("time", np.full(run.sizes["time"], 0.0), run["surge"].attrs))
+    still = run.copy(deep=True)
+    still["surge"].values[:] = 0.0
     other = envelope_of(model.signature, model.read_windows(still, [60.0], 50))
     assert found.shape == (2, 50)
     assert np.all((found > 0.2) & (found < 3))  # SD of the waves of training

@@ -176,35 +176,33 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
         sea(1, 0.0, 20_000), ["sway", "heave"], ["eta_fwd"]
     )
 
-    def after(run):
-        live = model.live()
+    def after(push):
+        live, run = model.live(), sea(2, push)
         for u, y in zip(run["eta_fwd"].values, table(run, ["sway", "heave"]), strict=True):
             live.step([u], y)
-        made = live.forecast(32, np.zeros((32, 1)))
-        return live.consistency, live.consistency_by_state, (live.validity, made)
+        return live, live.forecast(32, np.zeros((32, 1)))
 
-    found = {push: after(sea(2, push)) for push in (0.0, 0.7)}
+    (sound, calm), (drifting, pushed) = after(0.0), after(0.7)
     # 256 squares of a normal number have a mean of 1 ± 0.09 (SD); those of free runs, which are
     # alike within some dozens of samples, of 1 ± 0.4.
-    assert found[0.0][0] == pytest.approx(1.0, abs=0.3)
-    assert_allclose(found[0.0][1][0], 1.0, atol=0.3)
-    assert np.all((found[0.0][1][1] > 0.2) & (found[0.0][1][1] < 2.2))
-    assert_allclose(found[0.7][1][0], [1.49, 1.0], atol=0.4)
+    assert sound.consistency == pytest.approx(1.0, abs=0.3)
+    one_step, free = sound.consistency_by_state
+    assert_allclose(one_step, 1.0, atol=0.3)
+    assert np.all((free > 0.2) & (free < 2.2))
+    one_step, (sway, heave) = drifting.consistency_by_state
+    assert_allclose(one_step, [1.49, 1.0], atol=0.4)
     # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
-    sway, heave = found[0.7][1][1]
     assert sway > 5 > 2.2 > heave > 0.2
-    assert found[0.7][0] == pytest.approx(found[0.7][1].mean())
+    assert drifting.consistency == pytest.approx(drifting.consistency_by_state.mean())
     # The state that errs is named, its claims shrink by the errors of late, and the other's not.
-    (valid, calm), (invalid, pushed) = found[0.0][2], found[0.7][2]
-    assert (valid, invalid) == (0, Validity.CONSISTENCY)
-    assert pushed.attrs["validity"] == "consistency"
-    assert calm.attrs["validity"] == "inside"
+    assert (sound.validity, drifting.validity) == (0, Validity.CONSISTENCY)
+    assert [each.attrs["validity"] for each in (calm, pushed)] == ["inside", "consistency"]
     widened = table((pushed / calm).sel(statistic="std"), ["sway", "heave"])[0]
     assert widened == pytest.approx([np.sqrt(sway), 1.0], rel=1e-9)
     assert pushed.sway.attrs["lead_time"] < calm.sway.attrs["lead_time"]
     # A push of 2 SD that ended six time constants ago is forgotten; over all samples, 3 would stay.
-    ended = after(sea(2, np.where(np.arange(3000) < 1500, 2.0, 0.0)))
-    assert ended[1][0][0] == pytest.approx(1.0, abs=0.3)
+    ended, _ = after(np.where(np.arange(3000) < 1500, 2.0, 0.0))
+    assert ended.consistency_by_state[0, 0] == pytest.approx(1.0, abs=0.3)
 
 
 @in_place_and_carried
