@@ -121,21 +121,6 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
     assert_allclose(models[0].coefficients, models[1].coefficients, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["fir", "arx", "subspace"])
-def test_waves_that_have_not_arrived_drive_where_a_lead_is_set(kind, runs):
-    def late(run):
-        return run.assign({name: run[name].roll(time=3, roll_coords=False) for name in INPUTS})
-
-    spec, whole, test = dataclasses.replace(SPECS[kind], lead=3), slice(3, None), linear_run(3)
-    model = spec.fit([late(run).isel(time=whole) for run in runs], STATES, INPUTS)
-    plain = SPECS[kind].fit([run.isel(time=whole) for run in runs], STATES, INPUTS)
-    found = model.forecast(late(test), start=20.0, steps=40)
-    expected = plain.forecast(test, start=20.0, steps=40)
-    # The last three pairs of each training run have no look-ahead left.
-    assert_allclose(table(found, STATES), table(expected, STATES), atol=0.02)
-    assert found.attrs["reads_input_until"] == pytest.approx(2 * DT)
-
-
 @pytest.mark.parametrize("state", STATES)
 def test_the_recommended_subspace_model_takes_one_state(state):
     """The future of a period of 8 samples has 9 values of one state, fewer than 40."""
