@@ -52,14 +52,15 @@ def reads_until(model, run):
 
 
 def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
-    last = reads_until(model, drift) - 10
+    end = reads_until(model, drift)
+    last = end - 10
     short = up_to(drift, last)
     with pytest.raises(RequestError, match="ahead = 'predict' continues the input"):
         model.forecast(short, START, STEPS)
     found = model.forecast(short, START, STEPS, ahead="predict")
     assert found.sizes["time"] == STEPS
     # By hand: the probes continued, everything after the start but waves thrown away.
-    long = up_to(drift, last + 10).copy(deep=True)
+    long = up_to(drift, end).copy(deep=True)
     waves = foresee(
         table(short, INPUTS),
         10,
@@ -76,8 +77,8 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     # What is missing counts as not there, and what lies beyond it is not read.
     gone = drift.copy(deep=True)
     for name in INPUTS:
-        gone[name].values[last + 1 : reads_until(model, drift) + 1] = np.nan
-        gone[name].values[reads_until(model, drift) + 1 :] = 1e9
+        gone[name].values[last + 1 :] = np.nan
+        gone[name].values[end + 1 :] = 1e9
     again = model.forecast(gone, START, STEPS, ahead="predict")
     assert_array_equal(table(again, STATES), table(found, STATES))
     assert again.attrs["status"] == found.attrs["status"]
