@@ -90,12 +90,12 @@ def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
 
 
 def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
-    mean = np.array([[[0.0], [2.0]], [[np.nan], [np.nan]]])
-    y = np.array([[[3.0], [-2.0]], [[0.0], [0.0]]])
+    mean, std, y = np.array(
+        [[[0.0, 2.0], [np.nan, np.nan]], [[0.0, 1.0], [np.nan, np.nan]], [[3.0, -2.0], [0.0, 0.0]]]
+    )[..., None]
     floor = spread_floor(mean, y)
     assert floor[0] == pytest.approx(np.sqrt((9 + 16) / 2) / 4, rel=1e-15)
     assert spread_floor(mean[1:], y[1:])[0] == 1.0
-    std = np.array([[[0.0], [1.0]], [[np.nan], [np.nan]]])
     scores = scaled_scores(mean, band_scale(std, floor), y)
     assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
     assert np.isinf(scores[1]).all()
@@ -104,9 +104,8 @@ def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
 
 
 def test_scores_by_hand_and_a_band_that_is_lost():
-    lower, upper = np.array([[0.0], [0.0], [np.nan]]), np.array([[1.0], [2.0], [3.0]])
-    found = band_scores(lower, upper, np.array([[1.5], [0.5], [1.0]]))
-    assert_array_equal(found[:, 0], [0.5, -0.5, np.inf])
+    lower, upper, y = np.array([[0.0, 0.0, np.nan], [1.0, 2.0, 3.0], [1.5, 0.5, 1.0]])[..., None]
+    assert_array_equal(band_scores(lower, upper, y)[:, 0], [0.5, -0.5, np.inf])
     # Lost in more of the windows than the level leaves: no margin is wide enough.
     scores = np.concatenate([np.zeros((3, 10, 1)), np.full((1, 10, 1), np.inf)])
     assert conformal_margin(scores, 0.9, block_length=1).margin[0] == np.inf
