@@ -205,20 +205,6 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     assert ended.consistency_by_state[0, 0] == pytest.approx(1.0, abs=0.3)
 
 
-@in_place_and_carried
-def test_what_samples_tell_does_not_depend_on_when_it_is_read(models, drift, key):
-    late, often = (started(models[key], drift, START - 60) for _ in range(2))
-    for at in range(START - 60, START):
-        dead = [STATES[0]] if at == START - 30 else []
-        play(late, drift, at, at + 1, dead=dead)
-        play(often, drift, at, at + 1, dead=dead)
-        assert np.isfinite(often.consistency)
-        assert_array_equal(late.state, often.state)
-    # Sums of rows that are read one by one, or together: rounding.
-    assert_allclose(late.consistency_by_state, often.consistency_by_state, rtol=1e-9)
-    assert_allclose(late.innovation, often.innovation, rtol=0, atol=1e-12)
-
-
 def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkeypatch):
     model, higher = models["plain"], drift.copy(deep=True)
     for name in (*STATES, *INPUTS):
