@@ -141,10 +141,14 @@ def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_pa
         UnitFolder(tmp_path, study.digest).check()
 
 
-def test_results_that_name_no_study_are_not_overwritten(tmp_path):
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [(f"{UNITS}/one.nc", "does not say of which study"), (RESULT, "it has no checksum")],
+)
+def test_results_that_name_no_study_are_not_overwritten(result, words, tmp_path):
     (tmp_path / UNITS).mkdir()
-    (tmp_path / UNITS / "one.nc").write_bytes(b"")
-    with pytest.raises(RequestError, match=r"holds results, and .* does not say of which study"):
+    (tmp_path / result).write_bytes(b"")
+    with pytest.raises((RequestError, DataError), match=words):
         UnitFolder(tmp_path, "one").open("first")
 
 
