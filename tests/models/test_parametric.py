@@ -110,15 +110,15 @@ def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
     same = CHOSEN.fit(alike, *CHANNELS)
     assert same.settings.parameter == ""
     assert "a pooled one" in same.selection
-    assert tune(CHOSEN, alike, *CHANNELS).spec.parameter == ""
+    assert tune(CHOSEN, alike, *CHANNELS).settings.parameter == ""
 
 
 def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started(family):
     start = replace(CHOSEN, ridge=1e-6)
     result = tune(start, family, *CHANNELS, vary=["state_delays"])
-    assert result.spec.parameter == "rig.draught"
+    assert result.settings.parameter == "rig.draught"
     assert result.note.startswith("on runs of inner values that are held out, a model that varies")
-    before, after = (error(spec.fit(family, *CHANNELS)) for spec in (start, result.spec))
+    before, after = (error(spec.fit(family, *CHANNELS)) for spec in (start, result.settings))
     assert after < 1.01 * before
 
 
