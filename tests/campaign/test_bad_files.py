@@ -1,5 +1,6 @@
 """Every reader fed what is no run: one error that says what it is and how to fix it."""
 
+import os
 import re
 import shutil
 
@@ -10,10 +11,10 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
 from scipy import io
-from small_tank import CAMPAIGN, tank_columns, write_csv
+from small_tank import tank_columns, write_csv
 
-from seakeep.campaign import read_campaign, read_table
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.campaign import read_table
+from seakeep.errors import DataError, MissingFileError, RequestError, SeakeepWarning
 
 T = 0.05 * np.arange(400)
 HEAVE = np.sin(T)
@@ -118,24 +119,30 @@ def test_a_sound_file_under_another_name_is_recognised(tmp_path, kind, suffix):
     assert_array_equal(read_table(path)["heave"], HEAVE)
 
 
-# Runs and files that state different units.
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no FIFO")
+def test_whatever_a_path_names_the_error_says_its_reason(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "run.csv").write_text("t,h\n")
+    for name, reason in {
+        "run.csv/more.csv": "does not exist: there is no folder",
+        "pipe.csv": r"pipe\.csv is a pipe or a device, and only regular",
+    }.items():
+        with pytest.raises(MissingFileError, match=reason):
+            read_table(tmp_path / name)
 
 
-def prepared(tank, header, text=CAMPAIGN):
-    columns = tank_columns(1)
-    size = {"cm": 0.1, "m": 1e-3}.get(header, 1.0)
-    heave = columns.pop("Heave [mm]") * size
-    columns[f"Heave [{header}]" if header else "Heave"] = heave
-    write_csv(tank / "second.csv", columns)
-    (tank / "campaign.toml").write_text(text)
-    return read_campaign(tank / "campaign.toml").prepare()
+def test_a_stated_unit_against_a_header(tank, changed):
+    stated = 'column = "Heave"', 'column = "Heave"\nunit = "mm"'
 
+    def prepared(header, *more):
+        columns = tank_columns(1)
+        heave = {"m": 1e-3}.get(header, 1.0) * columns.pop("Heave [mm]")
+        columns[f"Heave [{header}]" if header else "Heave"] = heave
+        write_csv(tank / "second.csv", columns)
+        return changed(stated, *more).prepare()
 
-def test_a_stated_unit_against_a_header(tank):
-    text = CAMPAIGN.replace('column = "Heave"', 'column = "Heave"\nunit = "mm"')
-    assert "second" in prepared(tank, "mm", text)
-    assert "second" in prepared(tank, "-", text)
-    assert "second" in prepared(tank, "", text)
+    for header in ("mm", "-", ""):
+        assert "second" in prepared(header)
     for header in ("m", "deg"):
         with pytest.raises(
             RequestError,
@@ -143,10 +150,8 @@ def test_a_stated_unit_against_a_header(tank):
             rf"says '{header}' for the column 'Heave'\. Leave unit out where the files say it; "
             r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]",
         ):
-            prepared(tank, header, text)
-    mended = text.replace(
-        "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
-    )
+            prepared(header)
+    mended = "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
     with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
-        runs = prepared(tank, "deg", mended)  # millimetres, now said to be metres
+        runs = prepared("deg", mended)  # millimetres, now said to be metres
     assert runs["second"]["heave"].std() > 1.0

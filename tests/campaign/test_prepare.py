@@ -1,6 +1,7 @@
 """From files to analysis-ready runs."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
@@ -97,6 +98,14 @@ def test_prepared_runs(campaign):
     assert second.attrs["test_span"] == (2.0, 18.0)
     assert "train_span" not in second.attrs
     assert first["pitch_rate"].attrs["derived_from"] == "pitch, differentiated"
+
+
+def test_each_file_is_parsed_once(changed, monkeypatch):
+    """Although the encounter period is measured on all runs before the first is prepared."""
+    parsed, read_csv = [], pd.read_csv
+    monkeypatch.setattr(pd, "read_csv", lambda *a, **k: parsed.append(1) or read_csv(*a, **k))
+    assert len(changed(("sampling_rate = 10", "steps_per_period = 32")).prepare()) == 2
+    assert len(parsed) == 2
 
 
 def test_the_whole_record_is_resampled_and_then_cut(campaign):

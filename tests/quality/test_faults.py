@@ -2,12 +2,22 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from records import record
+from seas import sea
 
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality import Record
-from seakeep.quality.faults import FLAGS, find_held, find_outliers, noise_share, saturated
+from seakeep.quality.faults import (
+    FLAGS,
+    find_held,
+    find_outliers,
+    noise_share,
+    reading_step,
+    saturated,
+)
 from seakeep.quality.samples import constant, flagged, levels, noise
 
 DT = 0.04
@@ -150,3 +160,41 @@ def test_a_model_that_is_let_go_swings_back():
     assert not find_outliers(decay).any()
     decay[300:340] += np.clip(np.arange(40) / 3, 0, 1)  # a reading that comes within three samples
     assert find_outliers(decay)[302:340].all()
+
+
+OFTEN = np.arange(0, 100, 0.005)
+SEA = sea(3, (0.4, 0.9), peak=PERIOD, components=20).at(OFTEN)
+
+
+@given(
+    step=st.floats(0.05, 3.0),
+    offset=st.floats(-10, 10),
+    gain=st.sampled_from([1e-3, 1.0, 1e3]),
+    every=st.sampled_from([1, 2, 4]),
+)
+@settings(max_examples=40)
+def test_the_step_of_an_ideal_rounding_sensor_is_found(step, offset, gain, every):
+    read = gain * step * np.round((SEA[::every] + offset) / step)
+    # Samples are so close that the motion passes one step at a time, to rounding.
+    assert reading_step(read) == pytest.approx(gain * step, rel=1e-6)
+
+
+@pytest.mark.parametrize("every", [8, 10, 13])
+def test_frames_that_were_interpolated_to_a_faster_rate(every):
+    read = 0.5 * np.round(SEA[::every] / 0.5)
+    # Frames fall between samples, so that the last part of a change is missed: one of `every`.
+    between = np.interp(OFTEN, OFTEN[::every] + 0.0013, read)
+    assert reading_step(between) == pytest.approx(0.5, rel=1.1 / every)
+
+
+def test_noise_larger_than_the_step_hides_it():
+    noisy = SEA + 0.05 * np.random.default_rng(3).standard_normal(SEA.size)
+    for read in (
+        SEA,
+        np.full(500, 2.0),
+        np.where(OFTEN < 50, SEA, SEA[10_000]),
+    ):  # the last froze once
+        assert np.isnan(reading_step(read))
+    assert np.isnan(reading_step(np.round(noisy, 5)))
+    # Steps well above the noise are seen through it.
+    assert reading_step(0.4 * np.round(noisy / 0.4)) == pytest.approx(0.4, rel=1e-6)

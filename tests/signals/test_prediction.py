@@ -19,21 +19,6 @@ from seakeep.signals.prediction import (
 )
 
 
-def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
-    rng = np.random.default_rng(1)
-    first, second = 2 * 0.98 * np.cos(0.4), -(0.98**2)
-    series = lfilter([1.0], [1.0, -first, -second], rng.standard_normal((6000, 2)), axis=0)
-    expected = list(series[-2:])
-    for _ in range(20):
-        expected.append(first * expected[-1] + second * expected[-2])
-    found = predict_waves(series + np.array([3.0, -1.0]), 20)
-    spread = series.std(axis=0)
-    # Four periods of 16 samples are 63 coefficients, each with a standard error of 1/√6000.
-    error = np.abs(found - [3.0, -1.0] - expected[2:]).max(axis=0) / spread
-    assert np.all(error < 0.25)
-    assert np.all(np.abs(expected[2:]).max(axis=0) > 0.5 * spread)  # what there was to foresee
-
-
 def jumps_of(series, least=1e-3):
     """Samples of one channel that jump."""
     jumps = Jumps(np.array([least]))

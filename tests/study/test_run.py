@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
@@ -14,8 +15,9 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run_study
+from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import joined
-from seakeep.study.plan import make_plan
+from seakeep.study.plan import make_plan, warn_of_slow_study
 from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
 from seakeep.study.store import LOCK, RESULT, UNITS, UnitFolder
 
@@ -217,3 +219,50 @@ def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(t
         assert found.keys() == alone.keys()
         for name, group in found.items():
             xr.testing.assert_identical(group, alone[name])
+
+
+def described(folder):
+    study = read_study(folder / "study.toml")
+    return describe_study(study, make_plan(study))
+
+
+def test_a_run_that_was_learnt_from_is_found_and_named(study_folder):
+    files = sorted(study_folder.glob("*.csv"))
+    files[-1].write_bytes(files[0].read_bytes())  # the test run is a training run
+    with pytest.warns(SeakeepWarning, match="^unseen: file is one of first too"):
+        found = described(study_folder)["repeats"]
+    assert list(found["run"].values) == ["unseen"]
+    assert found["share"].item() > 0.5  # as far as the last of two random windows reaches
+    assert found["correlation"].item() == pytest.approx(1.0, abs=1e-3)
+    words = words_of_repeats(found)
+    assert words.startswith("The input 'eta_fwd' of unseen repeats training input: ")
+    assert words.endswith(
+        "turned by 0 degrees (correlation 1.000). Tests there show memory, not skill."
+    )
+
+
+def test_seas_of_their_own_repeat_nothing(study_folder):
+    assert "repeats" not in described(study_folder)
+
+
+DRIFT = 60.0
+"""Period of the drift put onto heave, s: the two training runs hold four periods in all."""
+
+
+def test_a_study_with_short_windows_is_told_once(study_folder, monkeypatch):
+    """The tutorial's runs, their heave on a slow drift three times as large as the waves."""
+    for path in study_folder.glob("*.csv"):
+        table = pd.read_csv(path, sep=";")
+        time, heave = table.iloc[:, 0], table.filter(like="HEAVE").columns
+        size = 3 * np.sqrt(2) * table[heave].std()
+        table[heave] += np.outer(np.sin(2 * np.pi * time / DRIFT), size)
+        table.to_csv(path, sep=";", index=False, float_format="%.6g")
+    study = read_study(study_folder / "study.toml")
+    plan = make_plan(study)
+    with pytest.warns(SeakeepWarning, match=r"slow motion of heave \(period [56]\d") as caught:
+        warn_of_slow_study(plan)
+    assert len(caught) == 1
+    assert "windows of 'bayesian' in" in str(caught[0].message)  # 20 T at most
+    monkeypatch.setattr("seakeep.study.run._computed", lambda *_: pytest.fail("told before"))
+    with pytest.warns(SeakeepWarning, match="slow motion"), pytest.raises(pytest.fail.Exception):
+        run_study(study, study_folder / "out")

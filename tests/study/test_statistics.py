@@ -117,30 +117,23 @@ def four():
     )  # fmt: skip
 
 
-def test_coverage_by_hand():
-    row = band_tables(four(), None, 0.95)["coverage"].sel(
-        model="m", band="members", against="measured"
-    )
-    assert_allclose(row["inside"], 0.5, rtol=1e-15)
-    assert_allclose(row["below"], 0.5, rtol=1e-15)
-    # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).
-    heave = 32.5 / np.sqrt(8 / 7) * np.mean([1, 0.5, 1])
-    assert_allclose(
-        row["relative_width"].sel(channel=["heave", "pitch"]), [heave, heave / 10], rtol=1e-12
-    )
-
-
-def test_a_calibrated_band_that_is_infinite_counts_neither_as_inside_nor_as_wide():
+def test_coverage_by_hand_where_a_calibrated_band_is_infinite():
+    """What is infinite counts neither as inside nor as wide."""
     margin = [[[1.0, 1.0], [np.inf, 1.0]]]
     calibration = xr.Dataset(
         {"margin": (("ensemble", "training", "channel"), margin)}, {"ensemble": ["m"]}
     )
     tables = band_tables(four(), calibration, 0.95)
-    row = tables["coverage"].sel(model="m", band="calibrated", against="measured")
-    assert_allclose(row["inside"], 0.5)
-    # Widths of 62 and 7 in turns; of heave in the first training set alone.
-    heave = 34.5 / np.sqrt(8 / 7) * np.mean([1, 0.5])
-    assert row["relative_width"].sel(channel="heave") == pytest.approx(heave, rel=1e-12)
+    rows = tables["coverage"].sel(model="m", against="measured")
+    assert_allclose(rows["inside"], 0.5, rtol=1e-15)
+    assert_allclose(rows["below"].sel(band="members"), 0.5, rtol=1e-15)
+    # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10); of 62
+    # and 7 where calibrated, of heave in the first training set alone.
+    members = 32.5 / np.sqrt(8 / 7) * np.mean([1, 0.5, 1])
+    calibrated = 34.5 / np.sqrt(8 / 7) * np.mean([1, 0.5])
+    width = rows["relative_width"].sel(band=["members", "calibrated"])
+    assert_allclose(width.sel(channel="heave"), [members, calibrated], rtol=1e-12)
+    assert width.sel(channel="pitch")[0] == pytest.approx(members / 10, rel=1e-12)
     bands = tables["bands"].sel(model="m", band="calibrated", part="all")
     assert_allclose(bands["inside"], 0.5)
     assert_allclose(bands["width"], 34.5)
