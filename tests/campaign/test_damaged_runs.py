@@ -13,26 +13,19 @@ from seakeep.quality import findings_of
 from seakeep.signals import encounter_period
 
 POOLED = ("sampling_rate = 10", "steps_per_period = 12")
-CUT = "Time [s],WP fwd [mm],Heave [mm],Pitch (deg),acc [g]\n0.0,1.0,2.0\n"
+CUT = b"Time [s],WP fwd [mm],Heave [mm],Pitch (deg),acc [g]\n0.0,1.0,2.0\n"
 NOTE = (
     r"run 'second' is left out of the encounter period: .*second\.csv.*"
     r"Once it is repaired, prepare again; or state role = 'unused' in \[runs\.second\]"
 )
 
 
-def damage(tank, how):
-    path = tank / "second.csv"
-    if how == "missing":
-        path.unlink()
-    else:
-        path.write_bytes({"cut": CUT.encode(), "empty": b"", "noise": bytes(range(256))}[how])
-
-
-@pytest.mark.parametrize("how", ["cut", "empty", "noise", "missing"])
-def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, tank, how):
+@pytest.mark.parametrize("content", [CUT, b"", bytes(range(256)), None])
+def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, tank, content):
     campaign = changed(POOLED)
     both = campaign.encounter_period()
-    damage(tank, how)
+    damaged, kept = tank / "second.csv", tank / "prepared/first.nc"
+    damaged.unlink() if content is None else damaged.write_bytes(content)
     with pytest.warns(SeakeepWarning, match=NOTE):
         run = campaign.prepare(["first"])["first"]
     alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
@@ -41,15 +34,14 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     told = [each for each in findings_of(run) if each.kind.word == "left out"]
     assert [each.channel for each in told] == ["run second"]
     assert "run 'second' is left out of the encounter period" in told[0].text
-    refused, kept = RequestError if how == "missing" else DataError, tank / "prepared/first.nc"
-    written = []
+    refused, written = RequestError if content is None else DataError, []
     # The others are kept, fresh as long as the damage is the same.
     for work in (write_prepared, load_prepared, write_prepared):
         with pytest.raises(refused, match=r"second\.csv"):
             work(campaign)
         written.append(kept.stat().st_mtime_ns)
     assert len(set(written)) == 1
-    write_csv(tank / "second.csv", tank_columns(1))
+    write_csv(damaged, tank_columns(1))
     write_prepared(campaign)
     assert kept.stat().st_mtime_ns > written[0]
     left_out = findings_of(load_prepared(campaign)["first"])
@@ -60,7 +52,7 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
 def test_the_commands(edited, tank, command):
     """prepare keeps what it can and ends with the error; fit and forecast of others run."""
     path = edited(POOLED)
-    damage(tank, "cut")
+    (tank / "second.csv").write_bytes(CUT)
     out, told = command("prepare", path, status=1)
     assert "prepared/first.nc" in out
     assert "second.nc" not in out
@@ -79,7 +71,7 @@ def test_the_commands(edited, tank, command):
 def test_every_bad_file_is_named(changed, tank):
     campaign = changed()
     (tank / "first.csv").write_text("")
-    damage(tank, "cut")
+    (tank / "second.csv").write_bytes(CUT)
     with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         write_prepared(campaign)
     campaign = changed(POOLED)

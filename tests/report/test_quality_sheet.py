@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 
 from seakeep.campaign import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
@@ -63,19 +63,15 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     from seakeep.report.figures.histories import quality_figure
     from seakeep.report.quality_sheet import channel_rows
 
-    time = np.linspace(0.0, 10.0, 101)
+    time = 0.1 * np.arange(101)
     heave = 3.0 + np.sin(time)
     flags = np.zeros(time.size, dtype=np.int16)
     flags[40:45] = FLAGS["missing"]
     heave[40:45] = np.nan
-    run = xr.Dataset(
-        {
-            "heave": ("time", heave, {"units": "m"}),
-            "pitch": ("time", np.deg2rad(5.0) * np.sin(time), {"units": "rad"}),
-        },
-        {"time": time, "heave_flags": ("time", flags)},
-        {"quality": as_json([Finding(SamplesKind.CONSTANT, "first", "heave", 1.0)])},
-    )
+    found = {"quality": as_json([Finding(SamplesKind.CONSTANT, "first", "heave", 1.0)])}
+    run = record(0.1, found, heave=heave, pitch=np.deg2rad(5.0) * np.sin(time))
+    run = run.assign_coords(heave_flags=("time", flags))
+    run["pitch"].attrs["units"] = "rad"
     rows = {name: cells for name, *cells in channel_rows(run)}
     assert rows["pitch"][0] == "deg"
     assert float(rows["pitch"][2]) == pytest.approx(5.0, rel=2e-3)  # the nearest sample
