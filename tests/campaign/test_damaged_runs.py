@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from said import data_error, warned
 from seas import sea
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError
 from seakeep.quality import findings_of
 from seakeep.signals import encounter_period
 
@@ -26,7 +27,7 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     both = campaign.encounter_period()
     damaged, kept = tank / "second.csv", tank / "prepared/first.nc"
     damaged.unlink() if content is None else damaged.write_bytes(content)
-    with pytest.warns(SeakeepWarning, match=NOTE):
+    with warned(NOTE):
         run = campaign.prepare(["first"])["first"]
     alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
     assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
@@ -72,10 +73,10 @@ def test_every_bad_file_is_named(changed, tank):
     campaign = changed()
     (tank / "first.csv").write_text("")
     (tank / "second.csv").write_bytes(CUT)
-    with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
+    with data_error(r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         write_prepared(campaign)
     campaign = changed(POOLED)
-    with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
+    with data_error(r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         campaign.encounter_period()
 
 
@@ -115,14 +116,12 @@ def test_pooled_drifts(tmp_path):
     campaign = read_campaign(path)
     whole = campaign.clocks()["r0"]["loads"]
     (tmp_path / "loads_2.csv").write_text("time,wave,load\n0.0,1.0\n")
-    with pytest.warns(
-        SeakeepWarning, match=r"run 'r2' is left out of the pooled clock drifts: .*loads_2\.csv"
-    ):
+    with warned(r"run 'r2' is left out of the pooled clock drifts: .*loads_2\.csv"):
         left = campaign.clocks(["r0"])["r0"]["loads"]
     assert "drift of 3 runs" in whole.describe()
     assert "drift of 2 runs" in left.describe()
-    with pytest.warns(SeakeepWarning, match="'r2' is left out"):
+    with warned("'r2' is left out"):
         run = campaign.prepare(["r0"])["r0"]
     assert "run 'r2' is left out of the pooled clock drifts" in run.attrs["quality"]
-    with pytest.raises(DataError, match=r"loads_2\.csv"):
+    with data_error(r"loads_2\.csv"):
         campaign.clocks()

@@ -1,14 +1,17 @@
 """Drafts of campaign files: they must be read and prepared as they are."""
 
+from math import tau
+
 import numpy as np
 import pytest
+from numpy.random import default_rng
+from said import request_error
 from scipy import io
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
-from seakeep.errors import RequestError
 
 
 @pytest.fixture
@@ -68,10 +71,10 @@ def test_guesses(logger):
 def regular(folder, name, period, height=20, seed=0, begin=-20.0, rate=25):
     """A regular run as a tank records it: still water, waves at the probe, then at the vessel."""
     t = np.arange(0, 60, 1 / rate)
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
 
     def wave(start, phase):
-        ramp, angle = np.clip((t - start) / (2 * period), 0, 1), 2 * np.pi * (t - start) / period
+        ramp, angle = np.clip((t - start) / (2 * period), 0, 1), tau * (t - start) / period
         return ramp * (np.sin(angle + phase) + 0.1 * np.sin(2 * angle))
 
     response = 1 / (1 + (1.2 / period) ** 4)
@@ -87,7 +90,7 @@ def regular(folder, name, period, height=20, seed=0, begin=-20.0, rate=25):
 def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path, drafted):
     files = [regular(tmp_path, f"run{i}", T, rate=200) for i, T in enumerate((1.5, 0.6, 1.0))]
     still = {"Time [s]": np.arange(0, 40, 0.005)}
-    random = np.random.default_rng(0)
+    random = default_rng(0)
     still |= {name: random.normal(0, 0.2, 8000) for name in ("WP fwd [mm]", "Heave [mm]")}
     files.append(write_csv(tmp_path / "still.csv", still))  # still water has no waves
     text, campaign = drafted(files)
@@ -99,7 +102,7 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path, drafted):
 def test_a_draft_asks_whether_slow_files_count_milliseconds(drafted):
     for rate, asks in ((50, False), (0.05, True)):
         t = np.arange(600) / rate
-        wave = {"t": t, "WP fwd [mm]": np.sin(2 * np.pi * np.arange(600) / 30)}
+        wave = {"t": t, "WP fwd [mm]": np.sin(tau * np.arange(600) / 30)}
         text, _ = drafted(wave)
         assert f"# the files have {rate} samples per second" in text
         assert ("time_unit = 'ms'" in text) is asks
@@ -112,7 +115,7 @@ def test_times_that_jitter_are_told_by_a_word_of_their_name(drafted, header, fac
     """A carriage that moves evenly before them in the file is none."""
     columns = tank_columns()
     even = columns.pop("Time [s]")
-    jitter = np.random.default_rng(0).uniform(-0.004, 0.004, even.size)
+    jitter = default_rng(0).uniform(-0.004, 0.004, even.size)
     content = {"carriage": 1.5 * even, header: factor * (even + jitter), **columns}
     text, campaign = drafted(content)
     assert campaign.settings.files.time == header
@@ -123,9 +126,7 @@ def test_times_that_jitter_are_told_by_a_word_of_their_name(drafted, header, fac
 def test_a_draft_of_structs_says_how_to_save_them(tmp_path):
     t = 0.02 * np.arange(1000)
     io.savemat(tmp_path / "run.mat", {"time": t, "waves": {"eta": t}, "motion": {"heave": t}})
-    with pytest.raises(
-        RequestError, match=r"'waves' is a struct .*\. Save .* one struct of vectors"
-    ):
+    with request_error(r"'waves' is a struct .*\. Save .* one struct of vectors"):
         draft_campaign([tmp_path / "run.mat"])
 
 
@@ -241,8 +242,8 @@ def test_a_dead_probe_shows_no_waves_and_drives_nothing(drafted, dead, beside):
     """Mains hum of 50 Hz at 50 samples per second is as slow as a wave."""
     columns = tank_columns(0, 60.0)
     t, heave = columns["Time [s]"], columns["Heave [mm]"]
-    series = {"constant": 0 * t + 3, "noise": np.random.default_rng(0).normal(0, 0.2, t.size),
-              "hum": 0.2 * np.sin(2 * np.pi * 50.3 * t)}  # fmt: skip
+    series = {"constant": 0 * t + 3, "noise": default_rng(0).normal(0, 0.2, t.size),
+              "hum": 0.2 * np.sin(tau * 50.3 * t)}  # fmt: skip
     waves = {"WP 1 [mm]": series[dead]} | ({"WP 2 [mm]": columns["WP fwd [mm]"]} if beside else {})
     text, campaign = drafted({"Time [s]": t, **waves, "Heave [mm]": heave})
     assert campaign.settings.runs["run"].waves == ("irregular" if beside else None)

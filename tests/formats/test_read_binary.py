@@ -10,10 +10,10 @@ import scipy
 import xarray as xr
 from matlab73 import save as matlab73
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import DataError
 from seakeep.formats import read_columns
 
 T = np.arange(200) * 0.05
@@ -137,10 +137,9 @@ def test_netcdf_table_with_names(tmp_path):
 def test_netcdf_transposed(tmp_path):
     table = xr.DataArray(MATRIX.T, dims=("channel", "time"), coords={"time": T})
     table.to_dataset(name="data").to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
-    with pytest.raises(
-        DataError,
-        match=r"'data' has dimensions \(channel: 3, time: 200\), which looks transposed; expected "
-        r"time first, \(time, channel\)",
+    with data_error(
+        r"'data' has dimensions \(channel: 3, time: 200\), which looks transposed; expected "
+        r"time first, \(time, channel\)"
     ):
         read_table(tmp_path / "run.nc")
 
@@ -152,16 +151,14 @@ def test_hdf5_groups(tmp_path):
             place = file.create_group(group)
             place["time"], place["heave"], place["wave"] = T, HEAVE, WAVE
             place["heave"].attrs["units"] = "mm"
-    with pytest.raises(
-        DataError,
-        match=r"no channels outside its groups: 'basin/run1' \(3 sets\), 'basin/run2' \(3 sets\)\. "
-        r"State which one with group = 'NAME' in \[files\], or give --group NAME to seakeep init",
+    with data_error(
+        r"no channels outside its groups: 'basin/run1' \(3 sets\), 'basin/run2' \(3 sets\)\. "
+        r"State which one with group = 'NAME' in \[files\], or give --group NAME to seakeep init"
     ):
         read_table(path)
     check(read_table(path, FileSettings(group="basin/run2")))
-    with pytest.raises(
-        DataError,
-        match=r"has no group 'basin/run8'\. Did you mean .*\? Its groups: .* Correct 'group'",
+    with data_error(
+        r"has no group 'basin/run8'\. Did you mean .*\? Its groups: .* Correct 'group'"
     ):
         read_table(path, FileSettings(group="basin/run8"))
     with h5py.File(path, "a") as file:
@@ -178,5 +175,5 @@ def test_hdf5_sets_of_several_columns_are_split(tmp_path):
     run = read_table(tmp_path / "run.h5", columns=columns)
     assert_array_equal(run["acc_2"], WAVE)
     assert [run[name].attrs["units"] for name in columns] == ["m/s2"] * 3
-    with pytest.raises(DataError, match=r"'picture' has 65 columns without names; beyond 64"):
+    with data_error(r"'picture' has 65 columns without names; beyond 64"):
         read_table(tmp_path / "run.h5", columns=["picture"])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from said import request_error
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import RequestError
 
 nptdms = pytest.importorskip("nptdms")
 
@@ -79,12 +79,11 @@ def test_scaled_channels(read):
 def test_groups(read):
     loads = channel("load", np.arange(2000.0), "loads", wf_increment=0.005)
     both = channel("heave", HEAVE, **WAVEFORM), loads
-    with pytest.raises(
-        RequestError,
-        match=r"several groups that are sampled differently: 'loads' \(1 channels of 2000\), 'run' "
-        r"\(1 channels of 200\)\. State which one with group = 'NAME'",
+    with request_error(
+        r"several groups that are sampled differently: 'loads' \(1 channels of 2000\), 'run' "
+        r"\(1 channels of 200\)\. State which one with group = 'NAME'"
     ):
         read(*both)
     assert read(*both, group="loads").sizes["time"] == 2000
-    with pytest.raises(RequestError, match=r"no group 'load'\. Did you mean 'loads'\? Its groups"):
+    with request_error(r"no group 'load'\. Did you mean 'loads'\? Its groups"):
         read(*both, group="load")

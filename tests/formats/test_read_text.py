@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error, request_error, warned
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.formats import read_columns
 
 PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
@@ -124,7 +124,7 @@ def test_options(read):
         r"has no column with a usual name of times\. State time = 'NAME' or sampling_rate "
         r"\(Hz\) in \[files\]\. Its columns: clock, heave"
     )
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         read(text, **stated)
 
 
@@ -142,13 +142,12 @@ def test_a_unit_of_time_stated_against_the_header(read):
     text = "Zeit [s],heave\n0,1\n0.02,2\n"
     for unit in ("s", "sec"):
         assert read(text, time_unit=unit)["time"][1] == 0.02
-    with pytest.raises(
-        RequestError,
-        match=r"time_unit: 'ms' is stated, and .*run\.csv says 's' for its time column 'Zeit'\. "
-        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header",
+    with request_error(
+        r"time_unit: 'ms' is stated, and .*run\.csv says 's' for its time column 'Zeit'\. "
+        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header"
     ):
         read(text, time="Zeit", time_unit="ms")
-    with pytest.raises(RequestError, match="the unit 'm' does not fit the time column 't'"):
+    with request_error("the unit 'm' does not fit the time column 't'"):
         read("t [m],heave\n0,1\n1,2\n")
     rated = read(text, sampling_rate=10)  # what the message proposes
     assert_array_equal(rated["time"], [0, 0.1])
@@ -156,9 +155,7 @@ def test_a_unit_of_time_stated_against_the_header(read):
 
 def test_latin_1_is_read_and_said(read):
     text = "tid [s],bølge [°]\n0,1\n1,2\n".encode("latin-1")
-    with pytest.warns(
-        SeakeepWarning, match=r"is not UTF-8 and was read as Windows-1252 \(Latin-1\); check"
-    ):
+    with warned(r"is not UTF-8 and was read as Windows-1252 \(Latin-1\); check"):
         run = read(text)
     assert run["bølge"].attrs["units"] == "°"
     assert read(text, encoding="latin-1").identical(run)
@@ -169,10 +166,9 @@ def test_a_header_and_a_row_that_state_other_units_are_refused(read, row):
     unit, said = ("cm", row.split(",")[1]) if row.endswith("deg") else ("deg", "rad")
     name = {"cm": "HEAVE_MRU", "deg": "Pitch"}[unit]
     text = f"Time [s],HEAVE_MRU [cm],Pitch (deg)\n{row}\n0,1,2\n1,2,3\n"
-    with pytest.raises(
-        DataError,
-        match=rf"the header says '{unit}' for the column '{name}', and the row of units below it "
-        rf"'{said}'\. Correct the wrong one of them",
+    with data_error(
+        rf"the header says '{unit}' for the column '{name}', and the row of units below it "
+        rf"'{said}'\. Correct the wrong one of them"
     ):
         read(text)
 
@@ -185,9 +181,7 @@ def test_a_header_and_a_row_that_spell_one_unit_in_two_ways(read):
 
 def test_commas_that_may_divide_thousands_are_refused(read):
     text = "t;h\n0;999\n1;1,234\n2;12,345\n"
-    with pytest.raises(
-        DataError, match=r"comma of '1,234' may divide thousands or decimals.* state decimal = ','"
-    ):
+    with data_error(r"comma of '1,234' may divide thousands or decimals.* state decimal = ','"):
         read(text)
     run = read(text, decimal=",")  # what the message proposes
     assert_array_equal(run["h"], [999, 1.234, 12.345])
@@ -282,5 +276,5 @@ NO_TABLE = {
 
 @pytest.mark.parametrize(("text", "message"), NO_TABLE.items())
 def test_what_is_no_table(read, text, message):
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
         read(text)

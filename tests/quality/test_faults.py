@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from records import record
 from seas import sea
 
@@ -27,14 +28,14 @@ PERIOD = 1.6
 
 def waves():
     frequency = np.linspace(0.4, 0.9, 20)
-    phase = np.random.default_rng(0).uniform(0, 6.28, 20)
+    phase = default_rng(0).uniform(0, 6.28, 20)
     return np.cos(2 * np.pi * np.outer(T, frequency) + phase).sum(axis=1)
 
 
 @pytest.fixture
 def noisy():
     x = waves()
-    return x + 0.02 * x.std() * np.random.default_rng(1).standard_normal(x.size)
+    return x + 0.02 * x.std() * default_rng(1).standard_normal(x.size)
 
 
 def recorded(x):
@@ -52,7 +53,7 @@ def faulty(x, kind, length, place):
     """A series with a fault; one that is held repeats the reading before it."""
     at = slice(start := round(place * (x.size - length)), start + length)
     x = np.round(x, 3)
-    rng = np.random.default_rng(length)
+    rng = default_rng(length)
     random = rng.uniform(40, 200, length) * (-1) ** np.arange(length)
     burst = rng.uniform(5, 15, length) * x.std() * rng.choice([-1, 1], length)
     held = x[max(start - 1, 0)]
@@ -86,7 +87,7 @@ def test_the_shortest_run_of_equal_readings_that_is_held(equal, stuck):
 def test_a_burst_is_flagged_whole(noisy, length):
     """Alternating readings, of which the first and the last may pass for a flank."""
     at = 1000 + np.arange(length)
-    noisy[at] = noisy.std() * np.random.default_rng(0).uniform(5, 15, length) * (-1) ** at
+    noisy[at] = noisy.std() * default_rng(0).uniform(5, 15, length) * (-1) ** at
     hit = np.flatnonzero(find_outliers(noisy))
     assert set(at[1:-1]) <= set(hit) <= set(at)
 
@@ -97,7 +98,7 @@ def test_a_sound_series_is_left_alone(noisy):
     impact = noisy.copy()
     impact[1500:1507] += 3 * noisy.std() * np.hanning(9)[1:-1]
     assert not find_outliers(impact).any()
-    noise = np.random.default_rng(0).standard_normal(100_000)
+    noise = default_rng(0).standard_normal(100_000)
     assert not find_outliers(noise).any()
     # The share of n samples of white noise scatters by 1/√n.
     assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
@@ -155,7 +156,7 @@ def test_saturation_recurs_at_the_end_of_the_range():
 def test_a_model_that_is_let_go_swings_back():
     """Most of its record is rest, beside which the first swings are further than 20 SD."""
     swings = np.exp(-0.5 * T) * np.cos(5 * T)
-    decay = swings + 1e-4 * np.random.default_rng(0).standard_normal(T.size)
+    decay = swings + 1e-4 * default_rng(0).standard_normal(T.size)
     assert np.abs(decay).max() > 40 * (np.percentile(decay, 95) - np.percentile(decay, 5)) / 3.29
     assert not find_outliers(decay).any()
     decay[300:340] += np.clip(np.arange(40) / 3, 0, 1)  # a reading that comes within three samples
@@ -188,7 +189,7 @@ def test_frames_that_were_interpolated_to_a_faster_rate(every):
 
 
 def test_noise_larger_than_the_step_hides_it():
-    noisy = SEA + 0.05 * np.random.default_rng(3).standard_normal(SEA.size)
+    noisy = SEA + 0.05 * default_rng(3).standard_normal(SEA.size)
     for read in (
         SEA,
         np.full(500, 2.0),

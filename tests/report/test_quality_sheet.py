@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from records import record
+from small_tank import CAMPAIGN, tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
@@ -13,7 +14,7 @@ from seakeep.quality.samples import SamplesKind
 pytest.importorskip("matplotlib")
 
 RUNS = "3101_3 3101_4 3102_1 3102_2 3111_2 3041_2 3061_2 3102_3 3012_1 3102_4 3061_1 3142_1 3031_2"
-CAMPAIGN = """
+CAMERAS = """
 [channels.acc_sb]
 column = "ACC_Heave_SB"
 [channels.acc_ps]
@@ -42,7 +43,7 @@ def test_cameras_that_differ_by_more_than_a_model_errs_are_flagged(tmp_path):
         f'[runs.{n}]\nfile = "${{SEAKEEP_DATA_DIR}}/ntnu_ship_section/{n}.csv"\n'
         for n in RUNS.split()
     ]
-    path.write_text(CAMPAIGN + "".join(runs))
+    path.write_text(CAMERAS + "".join(runs))
     found = {
         name: {e.kind.name: e.value for e in findings_of(run) if e.channel == "heave_of_the_camera"}
         for name, run in read_campaign(path).prepare().items()
@@ -95,15 +96,12 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
 
 
 def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, command):
-    from small_tank import CAMPAIGN as SMALL
-    from small_tank import tank_columns, write_csv
-
     for seed, name in enumerate(("first", "second")):
         columns = tank_columns(seed)
         columns["Heave [mm]"][400] += 500.0
         write_csv(tmp_path / f"{name}.csv", columns)
     campaign = tmp_path / "campaign.toml"
-    campaign.write_text(SMALL)
+    campaign.write_text(CAMPAIGN)
     assert "outlier: 1 samples" in command("prepare", campaign)[1]
     folder = tmp_path / "prepared"
     names = {p.name for p in folder.iterdir()}

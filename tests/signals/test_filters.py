@@ -1,5 +1,7 @@
 """Filters: what they were asked for, measured; integrals and envelopes of analytic signals."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -51,11 +53,11 @@ def test_constants_and_ramps_are_kept_up_to_the_ends():
 @settings(max_examples=20)
 @given(st.floats(0.5, 4.0), st.floats(0.0, 6.28), st.sampled_from([0, 1, 2]))
 def test_integral_of_a_wave_in_the_band(frequency, phase, times):
-    omega = 2 * np.pi * frequency
+    omega = tau * frequency
     wave = np.sin(omega * T + phase)
     derivative = omega**times * np.sin(omega * T + phase + times * np.pi / 2)
     # What is slower than the band goes: an offset, and a drift.
-    drifting = derivative + 0.2 + 0.01 * np.sin(2 * np.pi * 0.02 * T)
+    drifting = derivative + 0.2 + 0.01 * np.sin(tau * 0.02 * T)
     out = (
         integrate(drifting, DT, (0.4, 5.0), times) if times else band_pass(drifting, DT, (0.4, 5.0))
     )
@@ -66,7 +68,7 @@ def test_integral_of_a_wave_in_the_band(frequency, phase, times):
 
 @pytest.mark.parametrize(("frequency", "gain"), {0.2: 0.0, 0.4: 0.5, 5.0: 0.5, 6.0: 0.0}.items())
 def test_gain_of_the_band(frequency, gain):
-    wave = np.sin(2 * np.pi * frequency * T)
+    wave = np.sin(tau * frequency * T)
     out = band_pass(wave, DT, (0.4, 5.0))[INNER]
     # Read off a record of 30 s with flanks of 0.2 Hz: a few per cent.
     assert np.sqrt(2) * out.std() == pytest.approx(gain, abs=0.03)
@@ -79,8 +81,8 @@ def test_derivative_of_a_quartic_is_exact():
 
 
 def test_envelope_of_a_group():
-    slow = 1.0 + 0.4 * np.cos(2 * np.pi * 0.05 * T)
-    out = envelope_squared(5.0 + slow * np.sin(2 * np.pi * 1.0 * T), DT)
+    slow = 1.0 + 0.4 * np.cos(tau * 0.05 * T)
+    out = envelope_squared(5.0 + slow * np.sin(tau * 1.0 * T), DT)
     # The kernel of the Hilbert transform falls as 1/(π t): a kink at an end, 25 s away, leaks
     # about 1/(π ω t) = 0.002 of its size, twice an amplitude of 1.4, into a square of 2.
     assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)

@@ -1,11 +1,13 @@
 """Time axes, their gaps and jitter, and resampling."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error
 from scipy import special
 
-from seakeep.errors import DataError
 from seakeep.signals import bridge, inspect_times, onto_uniform, resample, uniform_step
 
 
@@ -36,7 +38,7 @@ def test_times_with_few_decimals_are_uniform(rate):
     }.items(),
 )  # fmt: skip
 def test_what_is_no_uniform_axis(time, message):
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
         uniform_step(time)
 
 
@@ -45,7 +47,7 @@ def test_what_would_alias_is_removed(new_dt):
     time = np.arange(6000.0)
     new_time = np.arange(0, 5990, new_dt)
     for factor in (1.05, 1.3, 1.9):
-        above = np.sin(2 * np.pi * factor * 0.5 / new_dt * time)
+        above = np.sin(tau * factor * 0.5 / new_dt * time)
         out = resample(above, time, new_time)
         inner = slice(int(800 / new_dt), -int(800 / new_dt))
         # 60 dB, within about 1 dB.
@@ -105,7 +107,7 @@ def test_rounding_of_times_does_not_add_up_over_a_long_gap():
     report = inspect_times(np.round(t, 3))
     assert (report.missing, report.jittered) == (600, False)
     assert report.step == pytest.approx(1 / 30, rel=1e-6)
-    with pytest.raises(DataError, match=r"600 sample\(s\) of 0\.0333333 s are missing"):
+    with data_error(r"600 sample\(s\) of 0\.0333333 s are missing"):
         uniform_step(np.round(t, 3))
 
 
@@ -115,15 +117,15 @@ def test_jitter_is_told_and_interpolated_away():
     report = inspect_times(t)
     assert report.jittered
     assert report.jitter_rms == pytest.approx(0.002, rel=0.1)
-    time, x = onto_uniform(t, np.sin(2 * np.pi * t))
+    time, x = onto_uniform(t, np.sin(tau * t))
     assert np.ptp(np.diff(time)) < 1e-12
     # A wave of 50 samples: cubic splines leave 1e-5, and the first sample is held.
-    assert_allclose(x[1:-1], np.sin(2 * np.pi * time)[1:-1], atol=1e-4)
+    assert_allclose(x[1:-1], np.sin(tau * time)[1:-1], atol=1e-4)
 
 
 def test_short_gaps_are_bridged_and_long_ones_marked():
     t = 0.01 * np.arange(1000)
-    x = np.sin(2 * np.pi * 0.5 * t)
+    x = np.sin(tau * 0.5 * t)
     holed = x.copy()
     holed[100:115] = holed[400:600] = holed[:3] = np.nan
     result = bridge(holed, 0.01, longest=0.2)

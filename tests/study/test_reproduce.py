@@ -1,6 +1,7 @@
 """The three acts of ``seakeep reproduce``: one tank, the same windows, and a page over them."""
 
 import warnings
+from math import tau
 
 import numpy as np
 import pytest
@@ -25,13 +26,13 @@ def record(name, seconds, rng):
     """A made-up run on one logger at 50 Hz: linear waves, and a drift in surge and loads."""
     t = np.arange(round(seconds * RATE) + 1) / RATE
     regular = {"regular_1_5": [0.86], "regular_2": [0.75], "regular_3": [0.61]}
-    omega = 2 * np.pi * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
-    turn = omega * t[:, None] + rng.uniform(0, 2 * np.pi, omega.size)
+    omega = tau * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
+    turn = omega * t[:, None] + rng.uniform(0, tau, omega.size)
 
     def waves(amplitude, lag, rate=0):
         return (amplitude * (1j * omega) ** rate * np.exp(1j * (turn - lag))).real.sum(axis=1)
 
-    drift = np.sin(2 * np.pi * t / 29.9) + 0.3 * np.sin(2 * np.pi * t / 47.0)
+    drift = np.sin(tau * t / 29.9) + 0.3 * np.sin(tau * t / 47.0)
     load = waves(0.1, 2.5) + 0.4 * drift
     made = {
         "kn_fwd": (waves(20.0, 0.0), "mm"),

@@ -7,11 +7,11 @@ import pytest
 import xarray as xr
 from cells import cells
 from numpy.testing import assert_allclose, assert_array_equal
+from said import warned
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
 from seakeep.core.density import density_grid
-from seakeep.errors import SeakeepWarning
 from seakeep.metrics import nrmse
 from seakeep.models.training import gather, system_of
 from seakeep.report.tables import ratio_of
@@ -172,9 +172,10 @@ ridge_scale = "absolute"
 
 def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
     put_tutorial(tmp_path, STUDY.replace("length = 6", "length = 20") + WILD)
-    with pytest.warns(SeakeepWarning, match=r"^6 forecast\(s\) diverged and are left out: model "
-        r"'wild', training set 't00', window 0 of 'unseen' \(unseen from .* and 1 more"
-    ):  # fmt: skip
+    with warned(
+        r"^6 forecast\(s\) diverged and are left out: model 'wild', training set 't00', window 0 "
+        r"of 'unseen' \(unseen from .* and 1 more"
+    ):
         found = run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}

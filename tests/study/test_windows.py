@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import xarray as xr
+from said import request_error
 
-from seakeep.errors import RequestError
 from seakeep.study import read_study
 from seakeep.study.plan import Needs, choose_tests, choose_training, windows_overlap
 from seakeep.study.settings import StudySettings
@@ -49,7 +49,7 @@ def test_what_is_left_out_is_the_papers():
     }.items(),
 )  # fmt: skip
 def test_what_no_study_file_may_say(tables, words):
-    with pytest.raises(RequestError, match=words):
+    with request_error(words):
         settings(**tables)
 
 
@@ -133,7 +133,7 @@ def test_random_training_windows_are_drawn_without_replacement_from_all_feasible
     # 352 and 252 stops are feasible; all of them are used when as many are asked for.
     every = training(windows=352 + 252)
     assert len({each.spans for each in every}) == 604
-    with pytest.raises(RequestError, match=r"605 windows were asked for and 604 are feasible"):
+    with request_error(r"605 windows were asked for and 604 are feasible"):
         training(windows=605)
 
 
@@ -153,7 +153,7 @@ def test_test_windows_apart_share_no_instant_and_all_that_fit_are_taken():
 
 def test_a_window_too_long_is_answered_with_the_longest_in_periods():
     # 500 instants are 15 periods, and a test span of 399 samples holds 398 after a start: 11.94.
-    with pytest.raises(RequestError, match=r"\(length at most 11.9 periods\)"):
+    with request_error(r"\(length at most 11.9 periods\)"):
         windows_of(steps=500)
 
 
@@ -164,7 +164,7 @@ def test_the_start_up_of_a_test_span_is_cut_off():
     without = windows_of(wave, windows=None, placement="random")
     # What remains before the first start is the delay history.
     assert min(w.start for w in without) == pytest.approx(NEEDS.history * DT)
-    with pytest.raises(RequestError, match=r"tests.set: no window is feasible.*start-up"):
+    with request_error(r"tests.set: no window is feasible.*start-up"):
         windows_of(wave, startup=66.0)
 
 
@@ -219,5 +219,5 @@ def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
     assert left_out(training(**given)) == [("a", "a_2"), ("b",)]
     assert left_out(training(**given, leave_out="run")) == [("a",), ("b",), ("a_2",)]
     del runs["b"]
-    with pytest.raises(RequestError, match="a run with its repetitions of a, a_2 leaves no run"):
+    with request_error("a run with its repetitions of a, a_2 leaves no run"):
         training(**given)
