@@ -5,8 +5,6 @@ what is not an array of real numbers: masked values, complex numbers, dates and 
 says what was received and how to correct it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import partial

@@ -18,11 +18,20 @@ from seakeep.signals import (
     waves_part,
     zero_up_crossings,
 )
-from seakeep.signals.waves import WAVES, energy_above
+from seakeep.signals.waves import WAVES, energy_above, is_regular
 
 
 def test_crossings_lie_between_samples():
     assert_allclose(zero_up_crossings([-1.0, 3.0, -1.0, -1.0], 0.5), [0.125])
+
+
+def test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not():
+    t = np.arange(0, 60, 0.02)
+    wave = np.sin(6.0 * t) + 0.5 * np.sin(12.0 * t) + 0.2 * np.sin(18.0 * t)
+    assert is_regular(np.clip(t / 15 - 1, 0, 1) * wave)  # still for a quarter, then a ramp
+    assert not is_regular(wave + 0.7 * np.sin(7.0 * t))
+    narrow = sea(0, band=(0.7, 1.3), peak=1.1)
+    assert not is_regular(narrow.at(np.arange(0, 100, 0.02)))
 
 
 def test_the_spectrum_holds_the_variance():

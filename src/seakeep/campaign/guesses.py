@@ -34,7 +34,7 @@ from seakeep.formats.columns import is_unit, named_unit
 from seakeep.quality.faults import noise_share
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, stretches
-from seakeep.signals.waves import energy_period, first_wave, tapered_power
+from seakeep.signals.waves import energy_period, first_wave, is_regular
 
 LONG = 64
 """Samples that a column must have for its waves or its step to be judged."""
@@ -54,11 +54,6 @@ head seas leave 0.02."""
 
 HYSTERESIS = 0.3
 """Standard deviations that a wave must pass where noise leads the count."""
-
-ONE_WAVE = 0.8
-"""Part of the variance near the peak's frequency and its harmonics beyond which waves are regular.
-
-Thirteen measured regular runs have 0.94 to 1.0, irregular ones 0.26 to 0.59."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,12 +181,7 @@ def _sea(file: File, series: FloatArray) -> Sea | None:
         if noise_share(series) > 0.5:
             return None
         series = series[waves_part(series, step)]
-        power = tapered_power(series)
-        frequency = np.fft.rfftfreq(series.size, step)
-        peak = frequency[1 + np.argmax(power[1:])]
-        off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
-        near = off < max(0.1 * peak, 2.5 * frequency[1])
-        regular = power[near].sum() > ONE_WAVE * power[1:].sum()
+        regular = is_regular(series)
         period = encounter_period(series, step)
         if noisy := period < energy_period(series, step) * (0.8 if regular else 0.5):
             period = encounter_period(series, step, HYSTERESIS)

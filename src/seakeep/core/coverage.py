@@ -1,7 +1,5 @@
 """Coverage, width and scores of a band; numbers of a box plot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ r"""Kernel densities of a series, and their interval over bootstrapped series (p
 Jensen–Shannon divergence of two series, its interval, and its noise floor (paper, eq. JSD).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

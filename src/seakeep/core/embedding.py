@@ -5,8 +5,6 @@ The extended vectors are :math:`\hat x_j = [x_j; x_{j-1}; …; x_{j-s}]` and
 lag-major, the newest first. Series are ``(time, channel)``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

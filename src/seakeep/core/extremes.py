@@ -11,8 +11,6 @@ With :math:`a_k` half the distance between successive extremes, the decrement of
 :math:`\zeta = p / \sqrt{4\pi^2 + p^2}`, and q quadratic (Himeno, 1981; ITTC 7.5-02-07-04.5).
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 

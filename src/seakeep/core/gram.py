@@ -32,8 +32,6 @@ A Cholesky factorisation gives those at each λ, :math:`H (C + \lambda I)^{-1}`,
 eigendecomposition those of all ranks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -5,8 +5,6 @@ The uncertainty follows ITTC 7.5-02-07-02.1 (seakeeping experiments) and the gui
 an expanded uncertainty at 95 % with the degrees of freedom by Welch and Satterthwaite.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

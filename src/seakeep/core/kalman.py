@@ -6,8 +6,6 @@ rows of :math:`x_k`. The covariance depends on which rows were measured and on n
 may be run again later with the same gains, once a forcing f is known that was a guess before.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import linalg
 

@@ -4,8 +4,6 @@ Arrays are ``(…, time, channel)``; leading axes (members, windows) are kept. S
 standard deviation over the window with ddof = 1, and k = 1.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar

@@ -5,8 +5,6 @@ make. The slow parts of the squares of the elevation and of its derivatives weig
 by the frequency: :math:`D_0 + D_1 \omega^2 + D_2 \omega^4`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ the wave at the place where it meets the water. A ridge regression on few featur
 gives way to the linear forecast where a feature leaves the range of training.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -11,8 +11,6 @@ Nothing but the table and the states up to j enters the step. Models of several 
 side by side.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

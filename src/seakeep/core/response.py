@@ -11,8 +11,6 @@ shift. Rows of K that are combinations of the left eigenvectors :math:`w_i^H` of
 these modes alone; all other eigenvalues, and the right eigenvectors of their modes, stay.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import linalg
 

@@ -29,8 +29,6 @@ runs), a product of that rank and one addition per entry, instead of an inversio
 a smooth series small, and τ = 1 one that turns its sign at every sample.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -9,8 +9,6 @@ A second regression gives A, B, C and D. (Van Overschee and De Moor, 1994.) Mode
 as those of noise do where the states are more than the data decide, are moved onto the unit circle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

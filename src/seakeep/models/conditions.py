@@ -1,7 +1,5 @@
 """Runs that one model of all does not serve: what sets each apart, and where its probe stood."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

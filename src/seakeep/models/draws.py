@@ -12,8 +12,6 @@ range, or a quantile is not finite. All of it is then drawn again from the membe
 and counted.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

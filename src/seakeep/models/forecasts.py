@@ -1,7 +1,5 @@
 """Forecasts as Datasets: names, units, status, statistics of members; the door for arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The thin layer between labelled runs and arrays: Datasets in, arrays out, and back."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -378,7 +378,8 @@ class Live:
     def _smoothest(self) -> FloatArray:
         """RMS of third differences of inputs and states at least; infinite where they may jump."""
         coverage, signature = self.model.coverage, self.signature
-        is_wave = coverage.elevations & np.isin(np.arange(len(signature.inputs)), self._waves)
+        is_wave = np.isin(np.arange(len(signature.inputs)), self._waves)
+        is_wave &= np.isfinite(coverage.steepnesses)
         moves = [label.units in MOTIONS for label in signature.state_labels]
         spread = np.concatenate([0.25 * coverage.heights, signature.state_scale.spread])
         is_smooth = np.concatenate([is_wave, moves]) & (spread > 0)

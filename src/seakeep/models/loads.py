@@ -1,7 +1,5 @@
 """Read-outs fitted: loads by the wave at their lines, where that is better than none."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ An observable is added by one class with the members of :class:`seakeep.models.t
 one line in ``OBSERVABLES``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace

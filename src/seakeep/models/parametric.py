@@ -6,8 +6,6 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 :math:`[1, q; q, q^2] \otimes C_r`. At a value of the parameter the model is an ordinary one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import compress

@@ -6,8 +6,6 @@ Carlo and quasi-random points are used alike. A prior of a length states its uni
 ``Uniform("10 T", "30 T")``; bare numbers count samples.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field

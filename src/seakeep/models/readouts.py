@@ -1,7 +1,5 @@
 """Read-outs: channels that are read off what a model forecasts, after its free run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args

@@ -1,7 +1,5 @@
 """Kinds of models, and the files that hold them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TypeGuard, TypeVar, overload
 

@@ -1,7 +1,5 @@
 """Settings of a model, their checks, and the conversion of periods to samples."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Models as sealed files: JSON of settings beside arrays, and no code inside."""
 
-from __future__ import annotations
-
 import functools
 import json
 from collections.abc import Mapping

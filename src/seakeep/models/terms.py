@@ -3,8 +3,6 @@
 An observable in a file of its own needs this module alone; see :mod:`seakeep.models.observables`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Protocol

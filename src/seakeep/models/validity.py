@@ -139,7 +139,8 @@ class Conditions:
         texts: list[list[str]] = [[], [], [], []]
         for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
             peak, periods = self.peak[at], self.trained.periods
-            known, trained = self.trained.known[at], np.flatnonzero(self.trained.taught[at])
+            known = self.trained.known[at]
+            trained = np.flatnonzero(self.trained.shares[at] >= TRAINED)
             if self.reasons[0, at]:
                 low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
                 if low < peak < high and not known[peak]:
@@ -191,7 +192,7 @@ class Coverage:
         Fraction of the energy in each band.
     heights, steepnesses : ndarray, shape (channel,)
         Largest ones of a window: four SDs, of regular waves 2√2, and that over the length in deep
-        water of a wave of the mean period.
+        water of a wave of the mean period; the steepness of what is no elevation has no limit.
     lows, highs : ndarray, shape (channel,)
         Least and greatest mean of a run, less and plus ``FAR`` of its SDs.
     """
@@ -216,22 +217,13 @@ class Coverage:
         return 1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])
 
     @cached_property
-    def taught(self) -> BoolArray:
-        """Bands that were trained, shape (channel, band)."""
-        return self.shares >= TRAINED
-
-    @cached_property
     def known(self) -> BoolArray:
-        """Those, and the bands beside them: the leakage of a taper reaches there."""
-        known = self.taught.copy()
-        known[:, 1:] |= self.taught[:, :-1]
-        known[:, :-1] |= self.taught[:, 1:]
+        """Bands that were trained, and those beside: a taper leaks there. Shape (channel, band)."""
+        trained = self.shares >= TRAINED
+        known = trained.copy()
+        known[:, 1:] |= trained[:, :-1]
+        known[:, :-1] |= trained[:, 1:]
         return known
-
-    @cached_property
-    def elevations(self) -> BoolArray:
-        """Inputs that are wave elevations, shape (channel,)."""
-        return np.array([is_elevation(each) for each in self.channels], dtype=bool)
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -241,6 +233,7 @@ class Coverage:
         count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
         energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
         heights, steepnesses = np.max([_heights(each, dt) for each in series], axis=0)
+        steepnesses[[not is_elevation(each) for each in channels]] = np.inf
         shares = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
         means = np.stack([each.mean(axis=0) for each in series])
         # A constant is itself but for its rounding.
@@ -291,10 +284,10 @@ class Coverage:
             [
                 unseen > 0.5,
                 heights > margin * self.heights,
-                self.elevations & (steepnesses > margin * self.steepnesses),
+                steepnesses > margin * self.steepnesses,
             ]
         )
-        reasons &= self.taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
+        reasons &= self.known.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         if waves is not None:
             reasons &= np.isin(np.arange(len(self.channels)), waves)
         means = inputs.mean(axis=0)

@@ -4,8 +4,6 @@ Both rules judge a fault of one sample and of half a record alike. Thresholds ar
 of the series' own spread, steps and period, not of any one data set.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pages of sections: one HTML file that holds everything and asks the network for nothing."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

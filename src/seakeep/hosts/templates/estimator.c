@@ -59,7 +59,6 @@ enum { PLACED = {{ follows.placed | length }}, TAPS = {{ foresight.shape[3] }} }
 {{ array("steepnesses", coverage.steepnesses) -}}
 {{ array("lows", coverage.lows) -}}
 {{ array("highs", coverage.highs) }}
-static const int elevations[] = { {% for each in coverage.elevations %}{{ 1 if each else 0 }}, {% endfor %}0 };
 #define TRAINED {{ validity.TRAINED | hex }}
 enum { BANDS = {{ coverage.shares.shape[1] }} };
 
@@ -614,7 +613,7 @@ int {{ name }}_validity({{ name }}_estimator *e)
             outside |= {{ upper }}_PERIOD;
         if (height > margin * heights[q])
             outside |= {{ upper }}_HEIGHT;
-        if (elevations[q] && steepness > margin * steepnesses[q])
+        if (steepness > margin * steepnesses[q])
             outside |= {{ upper }}_STEEPNESS;
     }
 {% if "surge" in signature.states %}

@@ -1,7 +1,5 @@
 """Figures of checks: each draws a labelled result, on Axes that it is given or on a new figure."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Errors: of cells, runs, members and settings, over the age of a forecast, and densities."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Records over time and their spectra: forecasts over measurement, of runs, cells and acts."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
