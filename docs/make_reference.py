@@ -81,7 +81,6 @@ which the settings of each member are drawn:
 |---|---|
 | `{ uniform = ["10 T", "30 T"] }` | uniform between two bounds |
 | `{ log_uniform = [0.1, 10] }` | uniform in the logarithm |
-| `{ fixed = 100 }` | one value, as the bare value does |
 | `{ distribution = "norm", parameters = { loc = 15, scale = 1 }, unit = "T" }` | a distribution of `scipy.stats`; `unit` is that of a length, `"T"` or `"s"`, and samples without it |
 
 ## Observables

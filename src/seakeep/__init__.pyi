@@ -19,7 +19,6 @@ from .errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from .models import (
     BayesianHankelDMDc,
     Expression,
-    Fixed,
     HankelDMDc,
     HankelDMDcModel,
     HankelEnsemble,
@@ -43,7 +42,6 @@ __all__ = [
     "Campaign",
     "DataError",
     "Expression",
-    "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",

@@ -71,7 +71,7 @@ def test_a_forecast_upstream_says_how_far_ahead_it_reads(drifts, drift):
 @pytest.mark.parametrize(
     "spec",
     [
-        few(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
+        few(seed=np.random.default_rng(3), lead="0.5 T", ridge=2.0),
         BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
     ],
 )

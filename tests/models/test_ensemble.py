@@ -13,7 +13,6 @@ import seakeep
 from seakeep import (
     BayesianHankelDMDc,
     DataError,
-    Fixed,
     HankelDMDc,
     LogUniform,
     SeakeepWarning,
@@ -125,7 +124,7 @@ def test_priors_that_never_fit_are_refused(run):
         r"draw asked for \d+ \(window 800, .*\). Give longer runs or a later stop, or narrow"
     )
     with pytest.raises(DataError, match=text):
-        fitted(run, window=Fixed("50 T"))
+        fitted(run, window="50 T")
 
 
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
@@ -173,10 +172,10 @@ def test_windows_side_by_side_equal_single_forecasts(run):
 
 def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     fixed = {
-        "window": Fixed("10 T"),
-        "state_delays": Fixed("0.5 T"),
-        "input_delays": Fixed("1 T"),
-        "ridge": Fixed(1),
+        "window": "10 T",
+        "state_delays": "0.5 T",
+        "input_delays": "1 T",
+        "ridge": 1,
     }
     ensemble = fitted(run, train_on="windows", **fixed)
     draws = ensemble.draws
@@ -200,7 +199,7 @@ def test_members_that_diverge_say_when():
     heave = growth + 1e-12 * rng.normal(size=300)
     pitch, eta = rng.normal(size=(2, 300))
     run = record(DT, heave=heave, pitch=pitch, eta=eta)
-    spec = small(window=Fixed("10 T"), ridge=Fixed(1e-3), n_members=10)
+    spec = small(window="10 T", ridge=1e-3, n_members=10)
     ensemble = spec.fit(run, STATES, INPUTS, stop=20.0)
     forecast = ensemble.forecast(run, start=20.0, steps=99)
     summary = ensemble.forecast_summary(run, start=20.0, steps=99)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from seakeep import Fixed, LogUniform, Uniform
+from seakeep import LogUniform, Uniform
 from seakeep.models.priors import Distribution, prior_json, prior_of
 
 PRIORS = [
@@ -13,7 +13,6 @@ PRIORS = [
     Uniform("10 T", "30 T"),
     Distribution("truncnorm", {"a": -2, "b": 2, "loc": 1, "scale": 0.1}, "T"),
     LogUniform(0.1, 10),
-    Fixed(2.5),
     stats.norm(20, 2),
     stats.truncnorm(-1, 1, loc=20, scale=5),
     stats.randint(1, 5),
@@ -24,7 +23,6 @@ PRIORS = [
 def test_quantiles_are_those_of_scipy(q):
     assert Uniform(10, 30).ppf(q) == pytest.approx(stats.uniform(10, 20).ppf(q), rel=1e-12)
     assert LogUniform(0.1, 10).ppf(q) == pytest.approx(stats.loguniform(0.1, 10).ppf(q), rel=1e-9)
-    assert Fixed(3).ppf(q) == 3
 
 
 @pytest.mark.parametrize("prior", PRIORS, ids=lambda prior: type(prior).__name__)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from oscillators import Oscillator
 from records import record
 
-from seakeep import Fixed, HankelDMDc, SeakeepWarning, load_model
+from seakeep import HankelDMDc, SeakeepWarning, load_model
 
 
 def growing(factor=1.5, samples=60, scale=1.0):
@@ -121,7 +121,7 @@ def test_a_stable_model_is_the_same_to_the_last_bit(run, channels):
 
 
 def test_members_are_clipped_too():
-    delays = Fixed("0.1 s")
+    delays = "0.1 s"
     spec = few(state_delays=delays, input_delays=delays, delay_rows="ridge", stable=0.95)
     ensemble = spec.fit(growing(), ["heave"], ["eta_fwd"])
     assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)

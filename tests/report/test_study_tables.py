@@ -26,7 +26,6 @@ from seakeep.signals import Clock
         ("encounter_period", 1.6456710747033423, "1.64567 s"),
         ("seed", 2**63, "9223372036854775808"),
         ("ridge", {"uniform": [50.0, 150.0]}, "uniform, 50 to 150"),
-        ("window", {"fixed": "20 T"}, "20 T̂"),
         ("window", {"log_uniform": [320, 640]}, "log-uniform, 320 to 640 samples"),
         (
             "window",

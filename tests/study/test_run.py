@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
+from seakeep.errors import DataError, RequestError
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run_study
@@ -143,10 +144,14 @@ def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_pa
         UnitFolder(tmp_path, study.digest).check()
 
 
-def test_results_that_name_no_study_are_not_overwritten(tmp_path):
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [(f"{UNITS}/one.nc", "does not say of which study"), (RESULT, "it has no checksum")],
+)
+def test_results_that_name_no_study_are_not_overwritten(result, words, tmp_path):
     (tmp_path / UNITS).mkdir()
-    (tmp_path / UNITS / "one.nc").write_bytes(b"")
-    with request_error(r"holds results, and .* does not say of which study"):
+    (tmp_path / result).write_bytes(b"")
+    with pytest.raises((RequestError, DataError), match=words):
         UnitFolder(tmp_path, "one").open("first")
 
 

@@ -107,16 +107,16 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
     follows, observed = input_map.follows, input_map.columns
-    back = follows.back if follows else 0
+    (own, _), (before, _) = observed.reaches.tolist()
+    back = max(follows.back if follows else 0, own - input_map.lead, before)
     kernels: list[FloatArray] = []
     every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]
     u = np.array([every], object)
     delayed, direct = list(map(str, every)), list[str]()
-    for each in observed.bound:
-        back = max(back, each.before - input_map.lead * each.delayed)
-        group = delayed if each.delayed else direct
-        for term in each.terms:
-            group += _columns(term, u, observed.limits, kernels)
+    for group, columns in zip(observed.groups, (delayed, direct), strict=True):
+        for each in group:
+            for term in each.terms:
+                columns += _columns(term, u, observed.limits, kernels)
     limited = zip(direct, observed.tops, observed.slopes, strict=True)
     direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
     content = {

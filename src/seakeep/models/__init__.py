@@ -10,7 +10,7 @@ from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live
 from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares
-from seakeep.models.priors import Fixed, LogUniform, Uniform
+from seakeep.models.priors import LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.registry import KINDS, is_ensemble, load_model
 from seakeep.models.settings import Needs, Select
@@ -28,7 +28,6 @@ __all__ = [
     "Expression",
     "FittedAlignment",
     "FittedReadOut",
-    "Fixed",
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",

@@ -101,13 +101,13 @@ def observables(signature: Signature) -> dict[str, Any]:
     ]
     ahead, now = (np.array([each], dtype=object) for each in (every[:count], every[count:]))
     delayed, direct, second = list(map(str, every[:count])), list[str](), []
-    for bound in observed.bound:
+    for each, bound in zip(observed.observables, observed.bound, strict=True):
         for term in bound.terms:
             if not isinstance(term, SlowSquare):
-                texts = term.columns(ahead if bound.delayed else now, observed.limits)[0]
-                if not bound.delayed:
+                texts = term.columns(ahead if each.delayed else now, observed.limits)[0]
+                if not each.delayed:
                     second += [{(0, len(direct) + at): 1.0} for at in range(len(texts))]
-                (delayed if bound.delayed else direct).extend(map(str, texts))
+                (delayed if each.delayed else direct).extend(map(str, texts))
                 continue
             weights = ((1.0,), (0.5 / term.dt, 0.0, -0.5 / term.dt), DIFFERENCE / term.dt**2)
             parts = enumerate(weights[term.order])
@@ -115,7 +115,7 @@ def observables(signature: Signature) -> dict[str, Any]:
             half, newest = len(term.kernel) // 2, lead - (term.order > 0)
             for shift in term.shifts:
                 taps = enumerate(term.kernel[::-1].tolist(), start=-half)
-                second.append({(newest - shift - at, len(direct)): each for at, each in taps})
+                second.append({(newest - shift - at, len(direct)): tap for at, tap in taps})
             direct.append(f"p({len(first)})^2")
     return {
         "Function": f"@(p) [{'; '.join(delayed + direct)}]",

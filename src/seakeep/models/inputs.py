@@ -73,15 +73,12 @@ class InputMap:
     @cached_property
     def _around(self) -> tuple[int, int, int]:
         """Samples that rows read: before those with delays, before those without, after both."""
-        delayed, direct = self.columns.groups
+        (back, ahead), (before, later) = self.columns.reaches.tolist()
+        ahead += self.lead
         if self.follows is not None:
             back = max(self.follows.back, self.follows.place.taps.size - 1)
             ahead = self.follows.ahead
-        else:
-            back = max((each.before for each in delayed), default=0)
-            ahead = self.lead + max((each.ahead for each in delayed), default=0)
-        before = max((each.before for each in direct), default=0)
-        return back, before, max([ahead, *(each.ahead for each in direct)])
+        return back, before, max(ahead, later)
 
     @cached_property
     def lead_samples(self) -> int:

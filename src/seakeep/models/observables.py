@@ -12,7 +12,16 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from seakeep.arrays import TINY, Datasets, FloatArray, check_choice, check_keys, names_of, number
+from seakeep.arrays import (
+    TINY,
+    Datasets,
+    FloatArray,
+    IntArray,
+    check_choice,
+    check_keys,
+    names_of,
+    number,
+)
 from seakeep.core.observables import slow_kernel
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
@@ -107,6 +116,7 @@ class SlowSquares:
     lags: tuple[float, ...] = (0, 1, 2, 3, 4, 5)
     period: float | None = None
     kind: ClassVar[str] = "slow_squares"
+    delayed: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         orders = _numbers(self.orders, "slow_squares: orders", "0, 1 or 2", 0, 3, whole=True)
@@ -123,12 +133,10 @@ class SlowSquares:
         if self.period is not None:
             number(self.period, "slow_squares: period", "seconds above 0", TINY)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
-        period = period if self.period is None else self.period / dt
-        assert period is not None
-        kernel, reach, ahead, lags = self._places(period)
+        kernel, reach, ahead, lags = self._places(dt)
         shifts = tuple(ahead - reach - lag for lag in lags)
         labels, terms = [], []
         for place in places:
@@ -142,21 +150,21 @@ class SlowSquares:
                     words = f"slow part of the square of {label.long_name}{dots.replace('_', ' ')}"
                     name = f"slow_{label.name}{dots}_squared_{lag:g}T"
                     labels.append(ChannelLabel(name, unit, f"{words}, {lag:g} periods before"))
-        before = max(0, reach - min(shifts))
-        return Bound(tuple(labels), False, before, ahead, terms=tuple(terms), slope=SLOPE)
+        return Bound(tuple(labels), terms=tuple(terms), slope=SLOPE)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """Samples around an instant; see :class:`Observable`."""
+        _, reach, ahead, lags = self._places(dt)
+        return max(0, 2 * reach + max(lags) - ahead), ahead
+
+    def _places(self, dt: float) -> tuple[FloatArray, int, int, list[int]]:
+        """Filter, its reach either side with the differences, look-ahead, and lags, in samples."""
         if self.period is None:
             raise RequestError(
                 "slow_squares counts in encounter periods, and how far it reads is asked before "
                 "there are runs to count them in. State its period (s)."
             )
-        _, reach, ahead, lags = self._places(self.period / dt)
-        return max(0, 2 * reach + max(lags) - ahead), ahead
-
-    def _places(self, period: float) -> tuple[FloatArray, int, int, list[int]]:
-        """Filter, its reach either side with the differences, look-ahead, and lags, in samples."""
+        period = self.period / dt
         kernel = slow_kernel(self.cutoff / period, round(HALF_WIDTH / self.cutoff * period))
         reach = len(kernel) // 2 + (max(self.orders) > 0)
         return kernel, reach, round(self.lead * period), [round(lag * period) for lag in self.lags]
@@ -164,8 +172,8 @@ class SlowSquares:
 
 def counted_in(observable: Observable, period: float | None) -> Observable:
     """An observable that counts in an encounter period (s) where it states no other."""
-    if isinstance(observable, SlowSquares) and observable.period is None:
-        return replace(observable, period=period)
+    if getattr(observable, "period", 0.0) is None:
+        return replace(observable, period=period)  # type: ignore[type-var]
     return observable
 
 
@@ -201,13 +209,14 @@ class Powers:
     of: tuple[str, ...]
     powers: tuple[int, ...] = (2, 3)
     kind: ClassVar[str] = "powers"
+    delayed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "of", _inputs(self.of, self.kind))
         powers = _numbers(self.powers, "powers: powers", "integers from 2 to 5", 2, 6, whole=True)
         object.__setattr__(self, "powers", powers)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         labels = [
@@ -220,7 +229,7 @@ class Powers:
             for place in places
         ]
         terms = (Power(tuple(places), self.powers),)
-        return Bound(tuple(labels), True, 0, 0, terms=terms, stiffness=STIFF)
+        return Bound(tuple(labels), terms=terms, stiffness=STIFF)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""
@@ -249,6 +258,7 @@ class Expression:
     expression: str
     units: str = ""
     kind: ClassVar[str] = "expression"
+    delayed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         for key in ("name", "expression"):
@@ -261,7 +271,7 @@ class Expression:
             )
         expressions.parse(self.expression)
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         parsed = expressions.parse(self.expression)
         places = {name: _column(inputs, name, self.kind) for name in parsed.channels}
@@ -274,7 +284,7 @@ class Expression:
             return out
 
         label = ChannelLabel(self.name, self.units, self.expression)
-        return Bound((label,), True, 0, 0, columns, (Formula(parsed, places),))
+        return Bound((label,), columns, (Formula(parsed, places),))
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""
@@ -340,8 +350,6 @@ class Observed:
         Those inputs.
     dt : float
         Time step, s.
-    period : float or None
-        Encounter period, samples, where an observable counts in it.
     spreads : tuple of float
         Standard deviations of the inputs in training.
     tops : tuple of float
@@ -351,7 +359,6 @@ class Observed:
     observables: tuple[Observable, ...]
     inputs: tuple[ChannelLabel, ...]
     dt: float
-    period: float | None
     spreads: tuple[float, ...]
     tops: tuple[float, ...] = ()
 
@@ -367,12 +374,14 @@ class Observed:
         name, first = next(iter(runs.items()))
         labels = labelled.channel_labels(first, inputs)
         counts = any(getattr(each, "period", 0.0) is None for each in observables)
-        period = labelled.mean_period(runs, list(inputs)) if counts else None
+        dt = labelled.run_step(first, name)
+        if counts:
+            period = labelled.mean_period(runs, list(inputs)) * dt
+            observables = tuple(counted_in(each, period) for each in observables)
         last = slice(None if window is None else -window, None)
         records = [labelled.channel_matrix(run, inputs, name)[last] for name, run in runs.items()]
         spreads = np.nanstd(np.concatenate(records), axis=0)
-        dt = labelled.run_step(first, name)
-        observed = cls(observables, labels, dt, period, tuple(spreads.tolist()))
+        observed = cls(observables, labels, dt, tuple(spreads.tolist()))
         direct = np.concatenate([observed.direct(each) for each in records])
         tops = np.fmax.reduce(direct, axis=0, initial=0.0)
         names = [label.name for group in (labels, *observed.labels) for label in group]
@@ -391,7 +400,7 @@ class Observed:
     @cached_property
     def bound(self) -> tuple[Bound, ...]:
         """The observables, ready for these inputs."""
-        return tuple(each.bind(self.inputs, self.period, self.dt) for each in self.observables)
+        return tuple(each.bind(self.inputs, self.dt) for each in self.observables)
 
     @cached_property
     def limits(self) -> FloatArray:
@@ -401,8 +410,21 @@ class Observed:
     @cached_property
     def groups(self) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:
         """The observables with the input delays, and those without."""
-        delayed = tuple(each for each in self.bound if each.delayed)
-        return delayed, tuple(each for each in self.bound if not each.delayed)
+        pairs = [*zip(self.observables, self.bound, strict=True)]
+        delayed, direct = (
+            tuple(bound for each, bound in pairs if each.delayed == wanted)
+            for wanted in (True, False)
+        )
+        return delayed, direct
+
+    @cached_property
+    def reaches(self) -> IntArray:
+        """Samples before and after an instant that rows read with delays, and without; (2, 2)."""
+        out = np.zeros((2, 2), dtype=int)
+        for each in self.observables:
+            row = out[0 if each.delayed else 1]
+            np.maximum(row, each.reach(self.dt), out=row)
+        return out
 
     @cached_property
     def slopes(self) -> FloatArray:
@@ -443,9 +465,9 @@ class Observed:
         """One line per observable; `lead` is the look-ahead of the inputs."""
         lines = []
         for each, bound in zip(self.observables, self.bound, strict=True):
-            ahead = bound.ahead + (lead if bound.delayed else 0)
+            ahead = each.reach(dt)[1] + (lead if each.delayed else 0)
             columns = f"{len(bound.labels)} column{'' if len(bound.labels) == 1 else 's'}"
-            delays = "with the input delays" if bound.delayed else "at lags of their own"
+            delays = "with the input delays" if each.delayed else "at lags of their own"
             lines.append(
                 f"  observable    {named(each)}: {columns} {delays}, reads up to "
                 f"{max(ahead - 1, 0) * dt:.3g} s after the instant forecast"
@@ -453,5 +475,5 @@ class Observed:
         return lines
 
 
-NOTHING = Observed((), (), 0.0, None, ())
+NOTHING = Observed((), (), 0.0, ())
 """No observables."""

@@ -28,10 +28,13 @@ class Prior(Protocol):
         """Quantile function: the value below which lies the probability `q`."""
 
 
-class _Stated:
-    """Parameters that are finite numbers, or lengths, and the unit that they share."""
+class _Bounded:
+    """Two bounds in order: finite numbers, or lengths, and the unit that they share."""
 
     key: ClassVar[str]
+    least: ClassVar[float] = -math.inf
+    low: Bound
+    high: Bound
     bounds: tuple[float, ...]
     unit: str
 
@@ -54,22 +57,11 @@ class _Stated:
             object.__setattr__(self, key, str(value) if isinstance(value, Length) else value)
         object.__setattr__(self, "bounds", tuple(finite))
         object.__setattr__(self, "unit", units.pop())
-
-
-class _Bounded(_Stated):
-    """Two parameters in order."""
-
-    low: Bound
-    high: Bound
-    least: ClassVar[float] = -math.inf
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        name, (low, high) = type(self).__name__, self.bounds
+        low, high = finite
         if not low < high:
             raise RequestError(
                 f"{name} needs its lower bound below the upper one; received {self.low!r} and "
-                f"{self.high!r}. Swap them, or use seakeep.Fixed for a single value."
+                f"{self.high!r}. Swap them, or state a single value as it is."
             )
         if low < self.least:
             raise RequestError(
@@ -140,29 +132,6 @@ class LogUniform(_Bounded):
 
 
 @dataclass(frozen=True)
-class Fixed(_Stated):
-    """One value, the same for every member.
-
-    Parameters
-    ----------
-    value : float or str
-        The value; of a length ``"1 T"``, ``"0.5 s"``, or samples.
-
-    Raises
-    ------
-    RequestError
-        If it is not a finite number.
-    """
-
-    key: ClassVar[str] = "fixed"
-    value: Bound
-
-    def ppf(self, q: float) -> float:
-        """Quantile function: the value, for any probability."""
-        return self.bounds[0]
-
-
-@dataclass(frozen=True)
 class Distribution:
     """A distribution of :mod:`scipy.stats` by its name.
 
@@ -216,7 +185,7 @@ class Distribution:
         return float(getattr(stats, self.distribution).ppf(q, **self.parameters))
 
 
-_OWN: dict[str, Any] = {each.key: each for each in (Uniform, LogUniform, Fixed)}
+_OWN: dict[str, Any] = {each.key: each for each in (Uniform, LogUniform)}
 
 
 def prior_of(name: str, value: object) -> Prior | None:
@@ -247,13 +216,13 @@ def prior_of(name: str, value: object) -> Prior | None:
         if "distribution" in value:
             return Distribution(**value)
         ((key, given),) = value.items()
-        return _OWN[key](*(given if isinstance(given, list | tuple) else (given,)))
+        return _OWN[key](*given)
     except RequestError as error:
         raise RequestError(f"{name}: {error}") from None
     except (TypeError, ValueError, KeyError):
         raise RequestError(
             f"{name}: a prior is one of {{ uniform = [a, b] }}, {{ log_uniform = [a, b] }}, "
-            "{ fixed = value }, { distribution = 'name', parameters = { … } }; received "
+            "{ distribution = 'name', parameters = { … } }; received "
             f"{value!r:.{SHOWN}}."
         ) from None
 
@@ -278,8 +247,6 @@ def prior_json(prior: Prior) -> dict[str, Any]:
     """
     if isinstance(prior, _Bounded):
         return {prior.key: [prior.low, prior.high]}
-    if isinstance(prior, Fixed):
-        return {prior.key: prior.value}
     if isinstance(prior, Distribution):
         return {**asdict(prior), "parameters": dict(prior.parameters)}
     dist: Any = getattr(prior, "dist", None)

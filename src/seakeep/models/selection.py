@@ -240,7 +240,7 @@ class Problem:
         delayed, direct = [True] * len(self.data.signature.inputs), list[bool]()
         for observable, each in zip(self.widest.observables, chain.columns.bound, strict=True):
             columns = [observable in candidate.observables] * len(each.labels)
-            (delayed if each.delayed else direct).extend(columns)
+            (delayed if observable.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared
         return np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
 

@@ -447,15 +447,19 @@ class HankelSettings:
         RequestError
             If an observable counts in encounter periods and does not state its own.
         """
-        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.observables), strict=True)
         delayed = self.input_delays
         if encounter_period and self.follows_surge:
             delayed += round(BACK * encounter_period / dt)
+        before, after = delayed, self.lead
+        for each in self.observables:
+            back, ahead = each.reach(dt)
+            before = max(before, back + (delayed if each.delayed else 0))
+            after = max(after, ahead + (self.lead if each.delayed else 0))
         return Needs(
             self.window or 1,
-            max(self.state_reach, self.centre + max(delayed, *before)),
+            max(self.state_reach, self.centre + before),
             self.history == "inside",
-            max(after),
+            after,
         )
 
     def to_json(self) -> Json:

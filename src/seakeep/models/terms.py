@@ -73,10 +73,6 @@ class Bound:
     ----------
     labels : tuple of ChannelLabel
         Its columns.
-    delayed : bool
-        Whether the columns take the input delays of the model, or stand as they are.
-    before, ahead : int
-        Samples before and after instant j that row j reads.
     columns : callable, optional
         From the inputs, shape (time, Q), to the columns, shape (time, len(labels)); rows are NaN
         where they need samples that are not there; by default what the terms say.
@@ -89,9 +85,6 @@ class Bound:
     """
 
     labels: tuple[ChannelLabel, ...]
-    delayed: bool
-    before: int
-    ahead: int
     columns: Callable[[FloatArray], FloatArray] | None = None
     terms: tuple[Term, ...] = ()
     stiffness: float = 1.0
@@ -105,16 +98,17 @@ class Bound:
 
 
 class Observable(Protocol):
-    """Functions of the inputs; frozen, with fields that are JSON values."""
+    """Functions of the inputs; frozen, with fields that are JSON values.
+
+    The columns take the input delays of the model where it is `delayed`, and stand as they are
+    elsewhere. A field ``period`` that is None becomes the encounter period of the runs, s.
+    """
 
     kind: ClassVar[str]
+    delayed: ClassVar[bool]
 
-    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
-        """Columns for these inputs.
-
-        `period` is the encounter period in samples, None where no observable of the model has a
-        ``period`` to fill in; `dt` is the time step in s.
-        """
+    def bind(self, inputs: Sequence[ChannelLabel], dt: float) -> Bound:
+        """Columns for these inputs at a time step, s."""
 
     def reach(self, dt: float) -> tuple[int, int]:
         """Samples before and after an instant that its row reads, delays of the model apart."""

@@ -161,11 +161,11 @@ def setting_text(key: str, value: Any) -> str:
 def _prior_text(prior: dict[str, Any], unit: str) -> str:
     """A prior, or another table, in words; `unit` is that of bare numbers."""
     lengths = {"T": " T̂", "s": " s"}
-    for kind, words in (("uniform", "uniform, "), ("log_uniform", "log-uniform, "), ("fixed", "")):
+    for kind in ("uniform", "log_uniform"):
         if kind in prior:
-            texts = [str(each).partition(" ") for each in np.atleast_1d(prior[kind])]
+            texts = [str(each).partition(" ") for each in prior[kind]]
             bounds = " to ".join(f"{float(each[0]):.6g}" for each in texts)
-            return words + bounds + lengths.get(texts[0][2], unit)
+            return f"{kind.replace('_', '-')}, {bounds}{lengths.get(texts[0][2], unit)}"
     if "distribution" in prior:
         given = ", ".join(f"{key}={each:.6g}" for key, each in prior["parameters"].items())
         shared = lengths.get(prior.get("unit", ""), unit)
