@@ -363,6 +363,8 @@ CHANGES = {
     ],
     "models/live.py": [
         ("np.where(is_smooth, SMOOTH * spread, np.inf)", "SMOOTH * spread", "models/test_live.py::test_a_load_may_jump_and_so_may_an_input_that_is_no_wave"),
+        ("np.minimum(self._raised, most)", "most", "models/test_live.py::test_errors_of_an_estimate_last_as_those_of_free_runs_do"),
+        ("errors.rms[-1] ** 2 / np.maximum(reached", "errors.rms[0] ** 2 / np.maximum(reached", "models/test_live.py::test_errors_of_an_estimate_last_as_those_of_free_runs_do"),
         ("self._count.doubtful = self._ahead + LATE", "pass", "models/test_live.py::test_a_sample_that_jumps_is_lost_and_named"),
         ("is_driven = not read[:, self._waves].any()", "is_driven = True", "models/test_live.py::test_filled_waves_drive_no_free_run"),
         ("sums += (1.0 - self._fade[1]) * (weights - sums)", "pass", "models/test_live.py::test_filled_waves_drive_no_free_run"),
@@ -371,7 +373,7 @@ CHANGES = {
         ("self._squares *= np.where(known, self._fade, 1.0)", "self._squares *= 1.0", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
         ("final = len(self._updates) - max(self._ahead - 1, 0)", "final = len(self._updates)", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
         ("wanted = steps - 1 + self._ahead", "wanted = steps + self._ahead", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
-        ("np.minimum(own + self._filter.ahead(count), errors)", "np.minimum(own, errors)", "models/test_live.py::test_a_dead_sensor_is_followed_through_the_others"),
+        ("np.minimum(own + self._filter.ahead(count, self._raised), errors)", "np.minimum(own, errors)", "models/test_live.py::test_a_dead_sensor_is_followed_through_the_others"),
         ("(1.0 - weight) * wider * scale.spread**2", "0.0", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
         ("variance = weight * (spread + wider * errors)", "variance = weight * wider * errors", "models/test_live.py::test_waves_that_are_not_known_widen_the_band"),
         ("return out + self._d @ self._row", "return out + 0 * self._d @ self._row", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),

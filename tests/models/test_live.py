@@ -1,6 +1,7 @@
 """A model in service: estimates, forecasts and states to go on from, sample by sample."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import seakeep.models.live
 from seakeep import HankelDMDc, Powers, RequestError, load_live
+from seakeep.core.kalman import DelayFilter
 from seakeep.models.live import LEAST_RECORD, MOTIONS
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
@@ -137,17 +139,32 @@ def test_a_dead_sensor_is_followed_through_the_others(models, drift):
     assert_array_equal(found[:, 0], truth[:, 0])
     assert_array_equal(np.isnan(live.innovation), [False, True])
     deviation = np.sqrt(live.covariance[1, 1])
-    assert 0 < deviation <= model.errors.at(steps)[1]
+    assert 0 < deviation < 1.001 * model.errors.at(steps)[1]
     assert np.sqrt(np.mean((found[:, 1] - truth[:, 1]) ** 2)) < 3 * deviation
     forecast = live.forecast(STEPS, table(drift, INPUTS)[START + steps :])
     own, bound = (model.errors.of_forecast(STEPS, since) for since in (0, steps))
-    carried = np.minimum(own + live._filter.ahead(STEPS), bound)
+    carried = np.minimum(own + live._filter.ahead(STEPS, live._raised), bound)
     assert_allclose(std(forecast) ** 2, carried, rtol=1e-9)
     assert np.any(carried > 1.1 * own)
     assert np.any(carried < 0.9 * bound)
     again = play(live, drift, START + steps, START + steps + 5)
     assert_array_equal(again[-1], table(drift, STATES)[START + steps + 4])
     assert not live.covariance.any()
+
+
+def test_errors_of_an_estimate_last_as_those_of_free_runs_do(models, drift):
+    live = started(models["plain"], drift)
+    free = DelayFilter(live._a, live._filter.process, live._noise, 0 * live._filter.covariance)
+    rms = live.errors.rms
+    for _ in rms:
+        free.shift()
+    added_up = np.sqrt(np.diagonal(free.covariance)[-2:])
+    live.errors = replace(live.errors, rms=9 * rms)  # which limit nothing
+    play(live, drift, START, START + 60, dead=["heave"])
+    known = np.sqrt(live._filter.covariance[-1, -1])
+    expected = known * rms[-1, 1] / added_up[1]
+    assert_allclose(np.sqrt(live.covariance[1, 1]), expected, rtol=1e-9)  # rounding of sums
+    assert expected > 1.5 * known
 
 
 def test_measurement_noise_makes_an_estimate_of_a_measured_state(models, drift):
@@ -396,9 +413,9 @@ def test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead(models, d
     play(live, drift, START - 40, START, dead=["heave"])
     for _ in range(30):
         live.step()
-    both = live.errors.of_forecast(1) + live._filter.ahead(1)
+    both = live.errors.of_forecast(1) + live._filter.ahead(1, live._raised)
     variance = np.minimum(both, live.errors.of_forecast(1, 70))[0]
-    assert std(live.forecast(5))[0, 1] ** 2 > 1.2 * variance[1]
+    assert std(live.forecast(5))[0, 1] ** 2 > 1.05 * variance[1]
 
 
 def test_forecasts_read_waves_whose_short_gaps_are_closed(models, drift, monkeypatch):
