@@ -101,12 +101,17 @@ class DelayFilter:
         gain[:, rows] = weights
         return gain
 
-    def ahead(self, steps: int) -> FloatArray:
-        """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N)."""
+    def ahead(self, steps: int, raised: FloatArray) -> FloatArray:
+        """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N).
+
+        Errors of each state are `raised` by a factor, shape (N,).
+        """
         count, size = self.a.shape
+        factors = np.resize(raised, size)
+        covariance = self.covariance * np.outer(factors, factors)
         out, reach = np.empty((steps, count)), self.a  # rows that carry them so far
         for row in out:
-            np.einsum("ij,ij->i", reach @ self.covariance, reach, out=row)
+            np.einsum("ij,ij->i", reach @ covariance, reach, out=row)
             on = reach[:, size - count :] @ self.a
             on[:, count:] += reach[:, : size - count]
             reach = on
