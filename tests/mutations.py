@@ -157,6 +157,7 @@ CHANGES = {
         ("part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)", "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
     ],
     "core/kalman.py": [
+        ("on[:, count:] += reach[:, : size - count]", "on[:, :-count] += reach[:, : size - count]", "core/test_kalman.py::test_errors_of_today_are_carried_as_the_model_carries_them"),
         ("+ np.diag(self.noise[rows])", "+ np.diag(self.noise[rows] ** 0.5)", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
         ("= before[count:, count:]", "= before[:-count, :-count]", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
         ("block = top @ self.a.T + self.process", "block = top @ self.a.T", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
