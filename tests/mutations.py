@@ -598,6 +598,8 @@ CHANGES = {
         ("measured.var(axis=1, ddof=1)", "measured.var(axis=1)", "study/test_response.py::test_the_squares_add_up_to_that_of_the_error"),
     ],
     "study/plan.py": [
+        ("groups_of(runs, training.leave_out", "groups_of({n: runs[n] for n in names}, training.leave_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
+        ("return run not in self.like", "return run in self.left_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
         ("float(span[0]) + test.startup", "float(span[0])", "study/test_windows.py::test_the_start_up_of_a_test_span_is_cut_off"),
         ("step = 1 if drawn else max(width, 1)", "step = 1", "study/test_windows.py::test_training_windows_apart_share_no_snapshot"),
         ("list(dict.fromkeys([*firsts.values(), *places]))[:count]", "places[:count]", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),

@@ -39,15 +39,19 @@ class TrainingSet:
         Run, first instant that may be read, and stop, s.
     left_out : tuple of str
         Runs that only test; empty where training and test lie in different spans.
+    like : tuple of str
+        Runs that may not test: those that train, and those of their groups; empty where training
+        and test lie in different spans.
     """
 
     name: str
     spans: tuple[Span, ...]
     left_out: tuple[str, ...] = ()
+    like: tuple[str, ...] = ()
 
     def may_test(self, run: str) -> bool:
         """Whether a run may test what was learnt here."""
-        return not self.left_out or run in self.left_out or run not in self.runs
+        return run not in self.like
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -124,11 +128,11 @@ def choose_training(
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
     training = settings.training
-    groups = defaultdict(list)
+    groups: list[list[str]] = []
     if training.scheme == "leave_out":
-        of_run = groups_of({n: runs[n] for n in names}, training.leave_out, inputs)
-        for name, group in of_run.items():
-            groups[group].append(name)
+        of_run = groups_of(runs, training.leave_out, inputs)
+        trained = dict.fromkeys(of_run[name] for name in names)
+        groups = [[name for name in of_run if of_run[name] == each] for each in trained]
         if len(groups) < 2:
             what = training.leave_out.replace("_", " ")
             what = "run with its repetitions" if what == "auto" else what
@@ -166,8 +170,9 @@ def choose_training(
                 f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
                 tuple(whole[name] for name in names if name not in group),
                 tuple(group),
+                tuple(name for other in groups if other is not group for name in other),
             )
-            for group in groups.values()
+            for group in groups
         )
     if training.scheme == "pooled":
         return (TrainingSet("pooled", tuple(whole.values())),)
@@ -406,13 +411,6 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
         )
         for name, test in settings.tests.items()
     }
-    for name, windows in tests.items():
-        for window in windows:
-            if not any(each.may_test(window.run) for each in training):
-                raise RequestError(
-                    f"tests.{name}: no model may be tested on the run '{window.run}', because all "
-                    "learn from it. Leave it out of training.runs, or name other runs."
-                )
     tested = {window.run for windows in tests.values() for window in windows}
     untested = [
         each.name
