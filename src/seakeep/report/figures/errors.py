@@ -129,7 +129,8 @@ def _draw_boxes(
     axes.grid(axis="x", visible=False)
     if logarithmic:
         every = np.concatenate([each for of_model in columns.values() for each in of_model])
-        low, high = 0.8 * every[every > 0].min(), 1.25 * np.nanmax(every)
+        every = every[np.isfinite(every) & (every > 0)]
+        low, high = 0.8 * every.min(), 1.25 * every.max()
         axes.set_ylim(low, high)
         if high < 100.0 * low:
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
