@@ -597,6 +597,7 @@ CHANGES = {
         ("moving[c, far][m]", "moving[c, False][m]", "study/test_statistics.py::test_a_forecast_that_runs_far_away_moves_no_density_of_another"),
         ("each in zip(moving.items(), rows, strict=True)", "each in zip([*moving.items()][::-1], rows, strict=True)", "study/test_statistics.py::test_divergences_are_those_of_the_joined_windows"),
         ("fitted - offset, total - fitted])", "fitted - offset, total])", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
+        ("of_window[k % len(of_window)]", "of_window[0]", "study/test_run.py::test_joined_series_are_the_windows_end_to_end"),
         ("np.where(lost, np.inf, p)", "p", "study/test_statistics.py::test_forecasts_that_diverge_are_named_and_count_as_infinite"),
         ("np.isinf(own) & np.isinf(other), 1.0", "np.isinf(own) & np.isinf(other), np.nan", "study/test_statistics.py::test_forecasts_that_diverge_are_named_and_count_as_infinite"),
         ("cells, **how)) - 1.0", "cells, **how))", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),

@@ -408,15 +408,15 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     """Forecasts of the windows of a test set joined end to end, and the measurement.
 
-    Forecasts have the shape (series, time, channel): one series per training set that may test all
-    windows; where none may (runs are left out), the k-th series takes each window's k-th training
-    set. A series in which a forecast diverged is left out; their number comes last.
+    Forecasts have the shape (series, time, channel): the k-th series takes each window's k-th
+    training set, from the first again where a window has fewer. A series in which a forecast
+    diverged is left out; their number comes last.
     """
-    judged = test["judged"].values
+    sets = [np.flatnonzero(of_window) for of_window in test["judged"].values.T]
     mean = test["mean"].sel(model=model).values
-    count = int(judged.sum(axis=0).min())
-    rows = np.argsort(~judged, axis=0, kind="stable")[:count]
-    picked = mean[rows, np.arange(judged.shape[1])].reshape(count, -1, mean.shape[-1])
+    count = max(map(len, sets))
+    rows = [[of_window[k % len(of_window)] for of_window in sets] for k in range(count)]
+    picked = mean[rows, np.arange(len(sets))].reshape(count, -1, mean.shape[-1])
     whole = np.isfinite(picked).all(axis=(1, 2))
     measured = test["measured"].values.reshape(-1, mean.shape[-1])
     return picked[whole], measured, int(np.count_nonzero(~whole))
