@@ -56,6 +56,7 @@ class TuneResult(Selected[Any]):
     ----------
     settings : HankelDMDc, FIR, ARX or Subspace
         The settings that were chosen; another kind than the first where that is varied and better.
+        Their ``fit(runs, states, inputs)`` fits the model.
     rows : tuple of dict
         What was tried, as in :attr:`table`.
     note : str
@@ -64,11 +65,6 @@ class TuneResult(Selected[Any]):
         Read-outs of the settings that were chosen, as all training runs teach them; those that
         were chosen among have their scores.
     """
-
-    @property
-    def spec(self) -> Any:
-        """The settings; ``spec.fit(runs, states, inputs)`` fits the model."""
-        return self.settings
 
     @property
     def table(self) -> xr.Dataset:

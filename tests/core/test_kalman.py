@@ -46,8 +46,8 @@ def test_it_is_the_textbook_filter_with_rows_missing():
 
 
 def test_errors_of_today_are_carried_as_the_model_carries_them():
-    found = DelayFilter(A, PROCESS, np.zeros(N), START).ahead(5)
-    carried = np.linalg.matrix_power(companion(), 5)
+    found = DelayFilter(A, PROCESS, np.zeros(N), START).ahead(5, np.array([1.0, 3.0]))
+    carried = np.linalg.matrix_power(companion(), 5) * np.resize([1.0, 3.0], SIZE)
     expected = np.diagonal(carried @ START @ carried.T)[-N:]
     assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
 

@@ -102,17 +102,21 @@ def moments(forecast, states):
     return table(forecast, states)[:2]
 
 
-def measured(run, model, lost_inputs=True):
+def values(run, model):
+    """Inputs and states."""
+    every = run.to_dataframe()
+    return [every[names].to_numpy(copy=True) for names in (model.inputs, model.states)]
+
+
+def measured(run, model):
     """Inputs and states, of which some are lost: at random, a dead sensor, all for long."""
-    every, rng = run.to_dataframe(), np.random.default_rng(4)
-    u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
-    lost = rng.uniform(size=y.shape) < 0.05
+    u, y = values(run, model)
+    lost = np.random.default_rng(4).uniform(size=y.shape) < 0.05
     lost[210:230] = False  # what follows is blind
     lost[:8], lost[150:200, 0], lost[230:310] = True, True, True
     y[lost] = np.nan
-    if lost_inputs:
-        u[[30, 160, 161, 162], 1:] = np.nan
-        u[[*range(268, 280), *range(302, 310), *range(315, 320)]] = np.nan
+    u[[30, 160, 161, 162], 1:] = np.nan
+    u[[*range(268, 280), *range(302, 310), *range(315, 320)]] = np.nan
     return u, y
 
 
@@ -126,8 +130,7 @@ def test_far_from_the_mean_of_training_a_forecast_lasts_as_in_the_live_model(
     rms = np.full((9, 2), 1.5) * scale.spread  # above those of the mean in seas of training
     vars(doubted)["errors"] = LeadErrors(model.errors.residual, rms)
     live, found = doubted.live(), Estimator(built(doubted, tmp_path), "rom")
-    every = make_run(100, 5).to_dataframe()
-    u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
+    u, y = values(make_run(100, 5), model)
     y[:, 0] += side * scale.spread[0]
     for at in range(100):
         assert_allclose(*found.beside(live, u[at], y[at]), rtol=0, atol=1e-9)
@@ -142,8 +145,7 @@ def test_far_from_the_mean_of_training_a_forecast_lasts_as_in_the_live_model(
 @pytest.mark.usefixtures("errors_of_training")
 def test_what_jumps_is_lost_as_in_the_live_model(library, model, make_run):
     live, found = model.live(), Estimator(library, "exact")
-    every, jumped = make_run(COUNT, 5).to_dataframe(), []
-    u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
+    (u, y), jumped = values(make_run(COUNT, 5), model), []
     far = 1e3 * y.std(axis=0)
     y[15], y[420], y[500:503] = y[15] + far, y[420] + far, y[500:503] + far
     u[600, 0] += 1e3
@@ -173,7 +175,7 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
 def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(library, model, make_run, tmp_path):
     wave = (Estimator(library, "exact"), model.live())
     constant = beside_a_constant(model, tmp_path)
-    u, y = measured(make_run(COUNT, 5), model, False)
+    u, y = values(make_run(COUNT, 5), model)
     for at in range(300):
         for found, live in (wave, constant):
             found.beside(live, u[at] * [1, 3], y[at])
@@ -189,7 +191,7 @@ def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(library, model, ma
 
 def test_a_mean_is_judged_over_two_periods_or_more(library, model, make_run):
     found, live = Estimator(library, "exact"), model.live()
-    u, y = measured(make_run(COUNT, 5), model, False)
+    u, y = values(make_run(COUNT, 5), model)
     for at in range(least := 8 * live.equations["gap"]):
         found.beside(live, u[at] + [0, 30], y[at])
     assert not (found.validity | live.conditions.validity) & Validity.MEAN

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from records import table
 
 from seakeep import HankelDMDc, RequestError
 from seakeep.hosts import write_fmu
@@ -169,6 +170,5 @@ def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samp
     assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)
     monkeypatch.setattr(type(live), "conditions", None)  # C does not widen outside the training
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, 1)))
-    ahead = live.forecast(3)
-    expected = [ahead[x].values[row, n] for row in (0, 1) for n in range(3) for x in model.states]
+    expected = table(live.forecast(3), model.states)[:2].ravel()
     assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)

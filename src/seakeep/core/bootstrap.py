@@ -407,10 +407,13 @@ def two_way_interval(
         drawn = rows[first : first + step, :, None], columns[first : first + step, None, :]
         bounds.append(np.asarray(statistic(*(each[drawn] for each in tables)), dtype=float))
     values = np.concatenate(bounds)
-    known = ~np.any([np.isnan(each).reshape(*shape, -1).all(axis=2) for each in tables], axis=0)
-    counts = known.any(axis=1).sum(), known.any(axis=0).sum()
-    sizes = zip(shape, counts, blocks, strict=True)
-    smallest = min((count / block for n, count, block in sizes if n > 1), default=0.0)
+    sizes = []
+    for each in tables:
+        known = (~np.isnan(each)).reshape(*shape, -1).any(axis=2)
+        counts = known.any(axis=1).sum(), known.any(axis=0).sum()
+        axes = zip(shape, counts, blocks, strict=True)
+        sizes += [count / block for n, count, block in axes if n > 1]
+    smallest = min(sizes, default=0.0)
     if smallest < FEWEST or np.isnan(values).all():
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
     value = np.asarray(statistic(*(each[None] for each in tables)), dtype=float)[0]

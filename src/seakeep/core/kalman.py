@@ -101,13 +101,17 @@ class DelayFilter:
         gain[:, rows] = weights
         return gain
 
-    def ahead(self, steps: int) -> FloatArray:
-        """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N)."""
+    def ahead(self, steps: int, raised: FloatArray) -> FloatArray:
+        """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N).
+
+        Errors of each state are `raised` by a factor, shape (N,).
+        """
         count = len(self.a)
         out = np.empty((steps, count))
         values, vectors = linalg.eigh(self.covariance)
         significant = values > 1e-14 * max(float(values[-1]), TINY)
         root = vectors[:, significant] * np.sqrt(values[significant])
+        root *= np.resize(raised, len(root))[:, None]
         for row in out:
             newest = self.a @ root
             root = np.concatenate([root[count:], newest])

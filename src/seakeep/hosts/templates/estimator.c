@@ -35,6 +35,7 @@ enum {
 {{ array("on_direct", d) }}
 {{ array("offset", offset) -}}
 {{ array("process", process) -}}
+{{ array("raised", raised) -}}
 {{ array("noise", noise) -}}
 {{ array("centre", centre) -}}
 {{ array("spread", spread) }}
@@ -631,7 +632,9 @@ const double *{{ name }}_estimated(const {{ name }}_estimator *e) { return e->x 
 
 double {{ name }}_deviation(const {{ name }}_estimator *e, int state)
 {
-    return sqrt(P(OLD + state, OLD + state));
+    int since = e->since < 1 ? LEADS : e->since < LEADS ? e->since : LEADS;
+    double most = errors[(since - 1) * N + state];
+    return fmin(raised[state] * sqrt(P(OLD + state, OLD + state)), most);
 }
 
 static int is_given(const double *future, int at, int q)
@@ -704,7 +707,7 @@ static double carried_error(const {{ name }}_estimator *e, const double *reach)
     double sum = 0.0;
     for (int j = 0; j < M; j++)
         for (int k = 0; k < M; k++)
-            sum += reach[j] * P(j, k) * reach[k];
+            sum += raised[j % N] * reach[j] * P(j, k) * reach[k] * raised[k % N];
     return sum;
 }
 
