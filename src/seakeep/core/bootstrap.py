@@ -370,7 +370,7 @@ def two_way_interval(
     Returns
     -------
     lower, upper : ndarray, shape (…)
-        Bounds; NaN where the cells of an axis of several make fewer than three
+        Bounds; NaN where an axis of several cells, judged or not, holds fewer than three
         blocks, which say nothing of their spread. An axis of one cell is not redrawn: the
         interval is then conditional on it.
 
@@ -407,13 +407,9 @@ def two_way_interval(
         drawn = rows[first : first + step, :, None], columns[first : first + step, None, :]
         bounds.append(np.asarray(statistic(*(each[drawn] for each in tables)), dtype=float))
     values = np.concatenate(bounds)
-    sizes = []
-    for each in tables:
-        known = (~np.isnan(each)).reshape(*shape, -1).any(axis=2)
-        counts = known.any(axis=1).sum(), known.any(axis=0).sum()
-        axes = zip(shape, counts, blocks, strict=True)
-        sizes += [count / block for n, count, block in axes if n > 1]
-    smallest = min(sizes, default=0.0)
+    smallest = min(
+        (n / block for n, block in zip(shape, blocks, strict=True) if n > 1), default=0.0
+    )
     if smallest < FEWEST or np.isnan(values).all():
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
     value = np.asarray(statistic(*(each[None] for each in tables)), dtype=float)[0]
