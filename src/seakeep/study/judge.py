@@ -21,7 +21,7 @@ from seakeep import statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.density import jsd_intervals
-from seakeep.core.metrics import Pair, extremes_error, over_channels, paired, root_mean_square
+from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, SeakeepError, quiet, warn
 from seakeep.executor import in_order
@@ -67,7 +67,7 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
     both = paired(**pair)
     p, m, spread, judged = both
     lost = np.isnan(p).any(axis=(-2, -1), keepdims=True)
-    endless = Pair(np.where(lost, np.inf, p), m, spread, judged)
+    endless = both._replace(p=np.where(lost, np.inf, p))
     size = root_mean_square(endless.p - m)
     errors = [size / spread, extremes_error(endless), size / np.asarray(pair["training_std"])]
     parts = np.stack([p - m, *split_bands(p - m, dt, frequency)])

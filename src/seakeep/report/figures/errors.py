@@ -33,7 +33,7 @@ from seakeep.study.judge import average_of
 
 FEWEST = 10
 """Values from which on a density is drawn; of fewer, points and box alone."""
-HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\")
+HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\", "....", "||||", "++++")
 """Of the boxes of one model after the other."""
 JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
 """Sideways places of the single values; the same in every figure."""
