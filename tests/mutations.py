@@ -605,7 +605,7 @@ CHANGES = {
         ("measured.var(axis=1, ddof=1)", "measured.var(axis=1)", "study/test_response.py::test_the_squares_add_up_to_that_of_the_error"),
     ],
     "study/plan.py": [
-        ("groups_of(runs, training.leave_out", "groups_of({n: runs[n] for n in names}, training.leave_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
+        ("{**known, name: runs[name]}", "runs", "study/test_windows.py::test_an_irregular_run_that_tests_groups_no_regular_ones_that_train"),
         ("return run not in self.like", "return run in self.left_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
         ("float(span[0]) + test.startup", "float(span[0])", "study/test_windows.py::test_the_start_up_of_a_test_span_is_cut_off"),
         ("step = 1 if drawn else max(width, 1)", "step = 1", "study/test_windows.py::test_training_windows_hold_the_largest_draw_with_its_history"),

@@ -18,7 +18,7 @@ from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Needs, Spec
 from seakeep.models.selection import groups_of
-from seakeep.models.settings import periods_to_samples
+from seakeep.models.settings import Folds, periods_to_samples
 from seakeep.models.validity import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
@@ -119,6 +119,23 @@ def parts_of(runs: Datasets, spans: Iterable[Span]) -> Groups:
     return {name: between(runs[name], (min(ends), max(ends))) for name, ends in edges.items()}
 
 
+def left_out_together(
+    runs: Datasets, names: Sequence[str], folds: Folds, inputs: Sequence[str]
+) -> list[list[str]]:
+    """Groups of training runs that are left out together, each with the other runs like them.
+
+    Other runs are compared one by one: an irregular run does not decide how regular ones that
+    train are grouped.
+    """
+    known = {name: runs[name] for name in names}
+    of_run = groups_of(known, folds, inputs)
+    for name in runs.keys() - known.keys():
+        each = groups_of({**known, name: runs[name]}, folds, inputs)
+        of_run.update((name, of_run[n]) for n in names if each[n] == each[name])
+    groups = dict.fromkeys(of_run.values())
+    return [[name for name in runs if of_run.get(name) == group] for group in groups]
+
+
 def choose_training(
     settings: StudySettings,
     runs: Datasets,
@@ -130,9 +147,7 @@ def choose_training(
     training = settings.training
     groups: list[list[str]] = []
     if training.scheme == "leave_out":
-        of_run = groups_of(runs, training.leave_out, inputs)
-        trained = dict.fromkeys(of_run[name] for name in names)
-        groups = [[name for name in of_run if of_run[name] == each] for each in trained]
+        groups = left_out_together(runs, names, training.leave_out, inputs)
         if len(groups) < 2:
             what = training.leave_out.replace("_", " ")
             what = "run with its repetitions" if what == "auto" else what
