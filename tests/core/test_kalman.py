@@ -29,7 +29,8 @@ def test_it_is_the_textbook_filter_with_rows_missing():
     measured = rng.standard_normal((120, N))
     measured[rng.uniform(size=measured.shape) < 0.3] = np.nan
     measured[40:60] = np.nan
-    ours, state = DelayFilter(A, PROCESS, noise, START.copy()), np.zeros(SIZE)
+    ours, state = DelayFilter(A, PROCESS, noise), np.zeros(SIZE)
+    ours.covariance[:] = START
     for y in measured:
         state = np.concatenate([state[N:], A @ state])
         ours.shift()
@@ -47,8 +48,10 @@ def test_it_is_the_textbook_filter_with_rows_missing():
 
 def test_errors_of_today_are_carried_as_the_model_carries_them():
     raised, units = np.array([1.0, 3.0]), np.tile([1.0, 1e9], S + 1)  # m, and a load in N
-    own, start = units[-N:], START * np.outer(units, units)
-    found = DelayFilter(own[:, None] * A / units, PROCESS, np.zeros(N), start).ahead(5, raised)
+    own = units[-N:]
+    filter_ = DelayFilter(own[:, None] * A / units, PROCESS, np.zeros(N))
+    filter_.covariance[:] = START * np.outer(units, units)
+    found = filter_.ahead(5, raised)
     carried = np.linalg.matrix_power(companion(), 5) * np.resize(raised, SIZE)
     expected = own**2 * np.diagonal(carried @ START @ carried.T)[-N:]
     assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
@@ -57,7 +60,8 @@ def test_errors_of_today_are_carried_as_the_model_carries_them():
 @pytest.mark.parametrize(("exactly", "factors"), [(False, [0.5, 1.0]), (True, [0.5, 2.0])])
 def test_a_limit_scales_a_state_with_its_correlations(exactly, factors):
     covariance = START + 0.1
-    filter_ = DelayFilter(A, PROCESS, np.zeros(N), covariance)
+    filter_ = DelayFilter(A, PROCESS, np.zeros(N))
+    filter_.covariance[:] = covariance
     filter_.limit(np.diagonal(covariance)[-N:] * [0.25, 4.0], exactly=exactly)
     scale = np.append(np.ones(SIZE - N), factors)
     assert_allclose(filter_.covariance, covariance * np.outer(scale, scale), rtol=1e-14)

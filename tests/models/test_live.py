@@ -154,7 +154,7 @@ def test_a_dead_sensor_is_followed_through_the_others(models, drift):
 
 def test_errors_of_an_estimate_last_as_those_of_free_runs_do(models, drift):
     live = started(models["plain"], drift)
-    free = DelayFilter(live._a, live._filter.process, live._noise, 0 * live._filter.covariance)
+    free = DelayFilter(live._a, live._filter.process, live._noise)
     rms = live.errors.rms
     for _ in rms:
         free.shift()

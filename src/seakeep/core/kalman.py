@@ -23,16 +23,17 @@ class DelayFilter:
         Covariance of the process noise.
     noise : ndarray, shape (N,)
         Variances of the measurement noise.
+
+    Attributes
+    ----------
     covariance : ndarray, shape (N(s+1), N(s+1))
-        Of the state to start from.
+        Of the state, which is known exactly at first.
     """
 
-    def __init__(
-        self, a: FloatArray, process: FloatArray, noise: FloatArray, covariance: FloatArray
-    ) -> None:
+    def __init__(self, a: FloatArray, process: FloatArray, noise: FloatArray) -> None:
         self.a, self.process, self.noise = a, process, noise
-        self.covariance = covariance.copy()
-        self._next = np.empty_like(self.covariance)
+        size = a.shape[1]
+        self.covariance, self._next = np.zeros((2, size, size))
 
     def shift(self, newest: FloatArray | None = None) -> None:
         """One step in time.

@@ -225,9 +225,9 @@ class Live:
         self._foreseen = partial(foresight, positions=self._places)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
-        size, variances = count * (s + 1), self._noise**2
+        variances = self._noise**2
         process = process_noise(errors.residual, self._a, variances)
-        self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
+        self._filter = DelayFilter(self._a, process, variances)
         self._deviations = np.sqrt(np.diagonal(process) + variances)  # after complete samples
         self._raised = np.where(variances > 0, 1.0, _raised(self._filter, errors))
         self._time = math.nan
@@ -997,7 +997,7 @@ def _raised(known: DelayFilter, errors: LeadErrors) -> FloatArray:
     Of each state, shape (N,); at least one.
     """
     count, process = len(known.a), known.process
-    one = DelayFilter(known.a, process, known.noise, np.zeros_like(known.covariance))
+    one = DelayFilter(known.a, process, known.noise)
     one.covariance[-count:, -count:] = process
     reached = np.diagonal(process) + one.ahead(len(errors.rms) - 1, np.ones(count)).sum(axis=0)
     return np.sqrt(np.maximum(errors.rms[-1] ** 2 / np.maximum(reached, TINY), 1.0))
