@@ -7,7 +7,7 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import compress
 from typing import Any
 
@@ -142,18 +142,10 @@ def regress_varying(
 def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
     """Training data of the runs at each value of a parameter."""
     values = [parameter_of(runs[name], parameter, name) for name in data.names]
+    by_run = [each.name for each in fields(data) if each.name != "signature"]
     out = {}
     for value in sorted(set(values)):
         here = [each == value for each in values]
-        out[value] = replace(
-            data,
-            names=tuple(compress(data.names, here)),
-            states=tuple(compress(data.states, here)),
-            delayed=tuple(compress(data.delayed, here)),
-            direct=tuple(compress(data.direct, here)),
-            windows=tuple(compress(data.windows, here)),
-            instants=tuple(compress(data.instants, here)),
-            inputs=tuple(compress(data.inputs, here)),
-            zeros=tuple(compress(data.zeros, here)),
-        )
+        own: Any = {each: tuple(compress(getattr(data, each), here)) for each in by_run}
+        out[value] = replace(data, **own)
     return out
