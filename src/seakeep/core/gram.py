@@ -276,12 +276,11 @@ def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> 
     rows = count + (blocks - 1) * depth
     newest_first = np.zeros((rows + depth - 1, channels))
     newest_first[: count + lags - 1] = series[first - lags + 1 : first + count][::-1]
-    step = newest_first.strides[0]
     laid_out = np.ascontiguousarray(
         np.lib.stride_tricks.as_strided(
             newest_first,
             shape=(rows, depth * channels),
-            strides=(step, newest_first.strides[1]),
+            strides=newest_first.strides,
             writeable=False,
         )
     )

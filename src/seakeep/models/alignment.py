@@ -360,20 +360,19 @@ class FittedAlignment:
         dt = labelled.run_step(run, name)
         last = max(span.stop for span in spans) + math.ceil(self.look_ahead(run) / dt)
         values = labelled.channel_matrix(run, self.inputs, name)[:last]
-        surge, reach = np.zeros(len(values)), (0.0, 0.0)
-        if settings.surge != "none":  # read where it is allowed, and no further
-            channel = [settings.surge_channel]
-            surge = labelled.channel_matrix(run, channel, name)[:, 0]
-            for span in spans:
-                known = surge[span.first : span.stop, None]
-                labelled.check_finite(known, channel, run, name, span.first)
-            every = np.concatenate([surge[span.first : span.stop] for span in spans])
-            reach = float(every.min()), float(every.max())
-        out, elevations = values.copy(), np.flatnonzero(self.carried)
-        out[:, elevations] = np.nan
         wanted = np.zeros(len(values), dtype=bool)
         for span in spans:
             wanted[span.first : span.stop] = True
+        surge, reach = np.zeros(len(values)), (0.0, 0.0)
+        if settings.surge != "none":  # read where it is allowed, and no further
+            channel = [settings.surge_channel]
+            surge = labelled.channel_matrix(run, channel, name)[:last, 0]
+            for span in spans:
+                known = surge[span.first : span.stop, None]
+                labelled.check_finite(known, channel, run, name, span.first)
+            reach = float(surge[wanted].min()), float(surge[wanted].max())
+        out, elevations = values.copy(), np.flatnonzero(self.carried)
+        out[:, elevations] = np.nan
         for begin, end in stretches(np.all(np.isfinite(values), axis=1)):
             read = begin + np.flatnonzero(wanted[begin:end])
             if not read.size:

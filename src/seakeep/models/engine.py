@@ -391,12 +391,12 @@ class _Opened:
             )
         available = time.size - 1 - at
         # The last input needed is the one an instant before the last state, and the lead after it.
-        most = available + 1 - lead if signature.inputs and not predicts else None
+        most = available + 1 - lead
         count = whole_number(
             available - max(lead - 1, 0) if steps is None else steps,
             "steps (to the end of the run)" if steps is None else "steps",
         )
-        if most is not None and count > most:
+        if signature.inputs and not predicts and count > most:
             ahead = f", of which the model's lead takes {lead}" if lead else ""
             raise RequestError(
                 f"{count} steps from {shown(time[at])} s need the input up to "
@@ -650,7 +650,7 @@ def fading(signature: Signature) -> float:
     return 1.0 - 1.0 / (MEMORY * max(longest, LEAST))
 
 
-def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> FloatArray:
+def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> None:
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
     scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
@@ -663,7 +663,6 @@ def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> Floa
         if not (farthest <= 1.0).all():
             lost = ~(farthest <= _excess(signature, windows))
             values[np.logical_or.accumulate(lost, axis=1)] = np.nan
-    return values
 
 
 Series = tuple[FloatArray, IntArray]

@@ -296,9 +296,8 @@ class HankelEnsemble(Model):
         str
             A few lines; the first reading finds the :meth:`spectral_radii`.
         """
-        origin, settings, draws = self.origin, self.settings, self.members
-        count = self.n_members
-        refused = sum(draw.redrawn for draw in draws)
+        origin, settings, count = self.origin, self.settings, self.n_members
+        refused = self.draws.attrs["redrawn"]
         scale = ", per snapshot pair" if settings.ridge_scale == "per_snapshot" else ""
         lines = [
             f"Ensemble of {counted(count, 'Hankel DMD model')} with control: "

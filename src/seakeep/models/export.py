@@ -12,6 +12,7 @@ from scipy import sparse
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, needing
 from seakeep.files import MARK, check_output, replacing
+from seakeep.models.engine import Windows
 from seakeep.models.inputs import Signature
 from seakeep.models.terms import SlowSquare
 from seakeep.signals.expressions import Text
@@ -155,15 +156,15 @@ def check_linear(signature: Signature) -> None:
         )
 
 
-def initial_state(signature: Signature, x_history: FloatArray, u_history: FloatArray) -> FloatArray:
-    """State of the system of :func:`matrices` at the last row of the histories.
+def initial_state(signature: Signature, windows: Windows) -> FloatArray:
+    """State of the system of :func:`matrices` at the start of a forecast of one step.
 
-    The histories hold at least s + 1 and z + 1 rows; the input at the instant itself is not part
-    of the state.
+    The input at the instant itself is not part of the state.
     """
     check_linear(signature)
-    states = (x_history - signature.state_scale.mean)[::-1][: signature.state_delays + 1]
-    inputs = (u_history - signature.input_scale.mean)[::-1][1 : signature.input_delays + 1]
+    states = (windows.histories[0] - signature.state_scale.mean)[::-1]
+    inputs = (windows.delayed[0] - signature.input_scale.mean)[::-1]
+    states, inputs = states[: signature.state_delays + 1], inputs[1 : signature.input_delays + 1]
     return np.concatenate([states.ravel(), inputs.ravel()])
 
 

@@ -380,7 +380,7 @@ class HankelDMDcModel(Model):
         u = rows_by_name("u_history", u_history, rows, self.inputs, "of the inputs")[-rows:]
         spreads = signature.state_scale.spread, signature.input_scale.spread[: len(self.inputs)]
         parts = []
-        for values, spread in ((x, spreads[0]), (u, spreads[1])):
+        for values, spread in zip((x, u), spreads, strict=True):
             steps = 1e-3 * np.tile(spread, len(values))
             near = np.concatenate([np.diag(steps), -np.diag(steps)]).reshape(-1, *values.shape)
             both = [np.broadcast_to(each, (len(near), *each.shape)) for each in (x, u)]
@@ -493,7 +493,7 @@ class HankelDMDcModel(Model):
             As :meth:`forecast`.
         """
         windows = self.read_windows(run, [start], 1)
-        return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
+        return export.initial_state(self.signature, windows)
 
     def initial_state_arrays(
         self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
@@ -520,7 +520,7 @@ class HankelDMDcModel(Model):
             given = as_real(u_history, "u_history")
             lead = given[-1:].repeat(self.lead_samples, axis=0) if given.ndim else given
         windows = check_arrays(self.signature, x_history, u_history, lead, 1)
-        return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
+        return export.initial_state(self.signature, windows)
 
     def _system(self, *, is_file: bool = False) -> export.System:
         export.check_linear(self.signature)
@@ -636,7 +636,7 @@ def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
     """Modes of a discrete system from its eigenvalues; see ``HankelDMDcModel.modes``."""
     upper = eigenvalues[eigenvalues.imag >= 0]
     with undefined():
-        poles = np.log(upper.astype(complex)) / dt
+        poles = np.log(upper) / dt
         natural = np.abs(poles)
         frequency = np.abs(poles.imag) / (2 * np.pi)
         # An eigenvalue of zero is gone after a step: overdamped, not undefined.

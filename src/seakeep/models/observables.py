@@ -373,9 +373,8 @@ class Observed:
         """Bind observables to inputs, and to the encounter period of the runs."""
         name, first = next(iter(runs.items()))
         labels = labelled.channel_labels(first, inputs)
-        counts = any(getattr(each, "period", 0.0) is None for each in observables)
         dt = labelled.run_step(first, name)
-        if counts:
+        if any(getattr(each, "period", 0.0) is None for each in observables):
             period = labelled.mean_period(runs, list(inputs)) * dt
             observables = tuple(counted_in(each, period) for each in observables)
         last = slice(None if window is None else -window, None)

@@ -75,8 +75,8 @@ class FittedReadOut:
 
 def read_out(
     readouts: Sequence[FittedReadOut], values: FloatArray, waves: FloatArray | None
-) -> FloatArray:
-    """Free runs, shape (…, N), physical units, with the channels that are read off them.
+) -> None:
+    """Put channels that are read off free runs, shape (…, N), physical units, into these.
 
     Parameters
     ----------
@@ -97,7 +97,6 @@ def read_out(
             channels.append((each.column, each.read(values, wave)))
     for column, channel in channels:
         values[..., column] = channel
-    return values
 
 
 def readouts_of(value: Any) -> ReadOuts:

@@ -417,7 +417,7 @@ def _problem(
         pieces = {}
         for name, run in runs.items():
             size = run.sizes["time"]
-            place = training_window(size - 1, widest.window, before, 0, widest.history)
+            place = training_window(size - 1, widest.window, before, widest.history)
             edges = np.linspace(place.first_column, size - after, folds + 1).astype(int)
             for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
                 samples = slice(first - before, stop + after)
@@ -768,8 +768,8 @@ def select(
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = dict.fromkeys(asked, "auto")
-    if isinstance(folds, str):
-        folds = 3 if len(runs) == 1 else folds
+    if isinstance(folds, str) and len(runs) == 1:
+        folds = 3
     step = labelled.common_step(runs)
     samples = labelled.mean_period(runs, inputs) if period is None else period / step
     stated = None
@@ -1011,9 +1011,10 @@ def readouts_for(
         If a read-out names what is no state, λ is zero where forecasts are cross-fitted, or kind
         "wave" meets no waves that are carried to the predicted surge.
     """
+    given = runs, states, inputs
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
     if "auto" not in readouts.values():
-        return _learnt(readouts, None, settings, 0.0, 0, (runs, states, inputs))
+        return _learnt(readouts, None, settings, 0.0, 0, given)
     ridge = float(settings.ridge)
     if ridge == 0.0:
         raise RequestError(
@@ -1022,7 +1023,6 @@ def readouts_for(
         )
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
-    given = runs, states, inputs
     problem = _problem(settings, given, apart, (steps,))
     return _learnt(readouts, problem, settings, ridge, steps, given)
 

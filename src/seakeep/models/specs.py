@@ -476,14 +476,14 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         inputs: list[str],
         readouts: tuple[FittedReadOut, ...],
     ) -> HankelDMDcModel:
-        data = gather(runs, states, inputs, None, self)
+        data, variation = gather(runs, states, inputs, None, self), None
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
             solution, data, variation = regress_varying(data, self, self.parameter, values)
-            model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
-            return replace(model, variation=variation)
-        solution = data.regress(self)
-        return HankelDMDcModel.fitted(self, data, solution, runs, readouts)
+        else:
+            solution = data.regress(self)
+        model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
+        return replace(model, variation=variation)
 
 
 def _window_scores(
@@ -818,22 +818,14 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             series = zip(*departing(zip(*series, strict=True), input_map), strict=True)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
-        scales = [
+        x, u, w = (
             moments(each, group, standardize=False)
             for each, group in zip(series, groups, strict=True)
-        ]
-        signature = Signature(
-            dt=dt,
-            state_labels=labels[0],
-            input_labels=labels[1],
-            state_delays=max(draw.settings.state_reach for draw in every),
-            input_delays=max(draw.settings.input_delays for draw in every),
-            input_map=replace(input_map, reference=shared.centre),
-            state_scale=scales[0],
-            input_scale=scales[1],
-            direct_scale=scales[2],
-            readouts=readouts,
         )
+        s = max(draw.settings.state_reach for draw in every)
+        z = max(draw.settings.input_delays for draw in every)
+        input_map = replace(input_map, reference=shared.centre)
+        signature = Signature(dt, *labels, s, z, input_map, x, u, w, readouts)
         return HankelEnsemble(
             settings=shared,
             origin=spec.to_json(),

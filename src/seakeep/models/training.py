@@ -13,7 +13,6 @@ import xarray as xr
 from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.core import gram
 from seakeep.core.embedding import (
-    History,
     TrainingWindow,
     block_means,
     spread_means,
@@ -217,22 +216,20 @@ def gather(
     """
     check_names(states, inputs)
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
-    window, history = settings.window, settings.history
-    state_delays, input_delays = settings.state_reach, settings.input_delays
     dt = labelled.common_step(runs)
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    input_map = input_map or settings.input_map(runs, states, inputs, window)
+    input_map = input_map or settings.input_map(runs, states, inputs, settings.window)
     reach = settings.reach(input_map)
     pieces, read = [], []
     for name, run in runs.items():
         time = np.asarray(run.variables["time"].values, dtype=float)
         place, shifted, cut = _place(time.size - 1, settings, input_map)
-        _check_length(place, cut.stop - 1, name, window, reach, history)
+        _check_length(place, cut.stop - 1, name, settings, reach)
         begin, here = cut.start, labelled.channel_matrix(run, states, name, cut)
-        needed = min(place.first, place.first_column - state_delays)
+        needed = min(place.first, place.first_column - settings.state_reach)
         labelled.check_finite(here[needed - begin :], states, run, name, needed)
-        needed = min(place.first, place.first_column - input_delays)
+        needed = min(place.first, place.first_column - settings.input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
         regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
         instants = time[place.first], time[place.last]
@@ -263,7 +260,7 @@ def _place(
     A step from j reads the input up to j + lead, and none after the window.
     """
     reach = settings.reach(input_map)
-    place = training_window(last, settings.window, settings.state_reach, reach, settings.history)
+    place = training_window(last, settings.window, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
     final = last - input_map.after
     shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
@@ -539,8 +536,9 @@ def is_constant(values: FloatArray) -> BoolArray:
 
 
 def _check_length(
-    place: TrainingWindow, final: int, name: str, window: int | None, reach: int, history: History
+    place: TrainingWindow, final: int, name: str, settings: HankelSettings, reach: int
 ) -> None:
+    window, history = settings.window, settings.history
     if window is not None and place.first < 0:
         raise DataError(
             f"{name} has {place.last + 1} samples up to the end of the training window, which asks "
