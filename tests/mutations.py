@@ -138,6 +138,7 @@ CHANGES = {
     "core/embedding.py": [
         ("last - window + 1", "last - window", "core/test_embedding.py::test_windows_at_the_papers_delays"),
         ("max(first, earliest)", "max(first, earliest) + 1", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+        ("reach = max(state_delays, input_delays)", "reach = state_delays", "core/test_embedding.py::test_windows_at_the_papers_delays"),
         ("axis=0)[::-1]", "axis=0)", "core/test_embedding.py::test_blocks_are_lag_major_the_newest_first"),
     ],
     "core/extremes.py": [
@@ -414,7 +415,7 @@ CHANGES = {
     ],
     "models/selection.py": [
         ("widest = replace(widest, window=None)  #", "pass  #", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
-        ("size - 1, widest.window, before, widest.history", "size - 1, widest.window, before, 'before'", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
+        ("size - 1, widest.window, before, 0, widest.history", "size - 1, widest.window, before, 0, 'before'", "models/test_selection.py::test_the_parts_of_a_single_run_are_those_of_its_training_window"),
         ("key = run, self.horizons", "key = run, ()", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("len(self.groups) <= FEW", "True", "models/test_choice.py::test_windows_of_few_runs_stay_in_memory_and_are_read_once"),
         ("key.lead != lead, near[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),

@@ -25,6 +25,6 @@ def test_blocks_are_lag_major_the_newest_first():
     ],
 )
 def test_windows_at_the_papers_delays(last, window, history, first, first_column, columns):
-    place = training_window(last, window, 160, history)
+    place = training_window(last, window, 32, 160, history)
     assert (place.first, place.first_column, place.columns) == (first, first_column, columns)
     assert place.samples == slice(first, last + 1)

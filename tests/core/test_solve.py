@@ -15,7 +15,7 @@ LONG, WIDE, SQUARE = (1, 1, 40), (9, 19, 6), (4, 9, 20)
 
 
 def of(states, inputs, s, z, columns):
-    window = training_window(len(states) - 1, columns + 1, max(s, z), "before")
+    window = training_window(len(states) - 1, columns + 1, s, z, "before")
     return Problem([states], [inputs], [inputs[:, :0]], [window], s, z)
 
 

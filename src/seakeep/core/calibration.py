@@ -317,7 +317,7 @@ def conformal_margin(
         block_length=lengths,
         blocks=blocks,
         warranted=np.minimum(level, blocks / (blocks + 1.0)),
-        level=float(level),
+        level=level,
     )
 
 

@@ -236,10 +236,10 @@ def coverage_table(
     0.5
     """
     low, high, y = _triple(lower, upper, measured)
-    heights = None if waves is None else as_real(waves, "waves")
     finite(y, "measured")
-    if heights is not None:
-        finite(np.atleast_1d(heights), "waves")
+    heights = None
+    if waves is not None:
+        heights = finite(np.atleast_1d(as_real(waves, "waves")), "waves")
         heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
     low, high, y = (each.reshape(-1, *y.shape[-2:]) for each in (low, high, y))
     lost = np.any(np.isnan(low) | np.isnan(high), axis=1, keepdims=True)

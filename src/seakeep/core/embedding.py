@@ -45,7 +45,9 @@ class TrainingWindow:
         return slice(self.first, self.last + 1)
 
 
-def training_window(last: int, window: int | None, reach: int, history: History) -> TrainingWindow:
+def training_window(
+    last: int, window: int | None, state_delays: int, input_delays: int, history: History
+) -> TrainingWindow:
     """Place the window of `window` samples that ends at sample `last`.
 
     Parameters
@@ -54,8 +56,8 @@ def training_window(last: int, window: int | None, reach: int, history: History)
         Last sample of the window.
     window : int or None
         Number of snapshots m; None takes all samples up to `last`.
-    reach : int
-        Samples of delay history: s or z, the longer one.
+    state_delays, input_delays : int
+        s and z.
     history : {"before", "inside"}
         Whether the delay history of the first snapshot lies before the window (or, where the
         run starts too late for that, as far into it as it must), or inside it.
@@ -66,6 +68,7 @@ def training_window(last: int, window: int | None, reach: int, history: History)
         Its ``columns`` may be zero or negative: the caller knows the names for the message.
 
     """
+    reach = max(state_delays, input_delays)
     first = 0 if window is None else last - window + 1
     earliest = first + reach if history == "inside" else reach
     return TrainingWindow(first, last, max(first, earliest))

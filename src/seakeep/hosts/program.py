@@ -124,14 +124,13 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
         If there are gaps in them, or step or units of the run are not those of the model.
     """
     signature = exportable(model).signature
-    history = signature.input_history
     labels = signature.state_labels + signature.input_labels
     name, time = labelled.opened(run, "the run", signature.dt, labels)
     at = labelled.nearest_sample(time, start, name)
     rows = []
     for names, first, stop in (
         (signature.states, at + 1 - signature.state_samples, at + 1),
-        (signature.inputs, at - history, at + signature.lead_samples),
+        (signature.inputs, at - signature.input_history, at + signature.lead_samples),
     ):
         if first < 0 or stop > time.size:
             raise RequestError(

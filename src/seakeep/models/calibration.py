@@ -154,7 +154,7 @@ def calibrate(
     scale: BandScale,
     folds: Literal["run"] | None,
     executor: Executor | None,
-    progress: Progress | None = None,
+    progress: Progress | None,
 ) -> Calibration:
     """Find the band of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
@@ -174,8 +174,8 @@ def calibrate(
     judged = held_out(cases, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
-        ahead = ensemble.signature.input_after
-        longest = max(run.sizes["time"] for _, run in cases.values()) - history - ahead
+        longest = max(run.sizes["time"] for _, run in cases.values())
+        longest -= history + ensemble.signature.input_after
         reason = "members have read what is left of them"
         if longest < steps:
             reason = f"at most {max(longest, 0)} steps fit into the longest of them"

@@ -91,11 +91,11 @@ def observables(signature: Signature) -> dict[str, Any]:
     dict
         Contents of the file; :data:`REGRESSORS` says how they make the regressors.
     """
-    input_map, observed = signature.input_map, signature.input_map.observed
+    observed = signature.input_map.observed
     assert observed is not None
     count, lead = len(signature.inputs), signature.lead_samples
     first = []  # weights of one output of the first filter, (sample back, input)
-    for back in (lead - input_map.lead, lead):
+    for back in (lead - signature.input_map.lead, lead):
         first += [{(back, place): 1.0} for place in range(count)]
     every = [
         Text(f"p({place + 1})", power="({0} ^ {1})", absolute="abs") for place in range(2 * count)
@@ -231,7 +231,6 @@ def to_mat(
         each for group in signature.input_map.regressors(signature.input_labels) for each in group
     ]
     means = [signature.input_scale.mean, signature.direct_scale.mean]
-    observed = signature.input_map.observed is not None
     content = {
         "A": A,
         "B": B,
@@ -241,14 +240,14 @@ def to_mat(
         "Lead": signature.lead_samples,
         "InputOffset": np.concatenate(means)[:, None],
         "OutputOffset": signature.state_scale.mean[:, None],
-        "InputName": _cell([label.name for label in labels]),
-        "OutputName": _cell([label.name for label in signature.state_labels]),
+        "InputName": _cell(signature.regressors),
+        "OutputName": _cell(signature.states),
         "InputUnit": _cell([label.units for label in labels]),
         "OutputUnit": _cell([label.units for label in signature.state_labels]),
         "StateName": _cell(_state_names(signature)),
         "Notes": "seakeep: x(k+1) = A x(k) + B (u(k) - InputOffset), "
         "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset; u(k) are inputs of k + Lead",
-        **(observables(signature) if observed else {}),
+        **(observables(signature) if signature.input_map.observed else {}),
         **more,
     }
     target = Path(path)
@@ -262,9 +261,10 @@ def to_mat(
 
 def _state_names(signature: Signature) -> list[str]:
     """Names of the entries of the state, in the order of :func:`matrices`."""
-    states = signature.states
     inputs = [label.name for label in signature.input_map.regressors(signature.input_labels)[0]]
-    delayed = [(name, back) for back in range(signature.state_delays + 1) for name in states]
+    delayed = [
+        (name, back) for back in range(signature.state_delays + 1) for name in signature.states
+    ]
     delayed += [(name, back) for back in range(1, signature.input_delays + 1) for name in inputs]
     return [f"{name}(k-{back})" if back else f"{name}(k)" for name, back in delayed]
 

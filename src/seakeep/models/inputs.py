@@ -258,7 +258,7 @@ class Drive:
 
     def table(self, first: int, stop: int) -> FloatArray:
         """Delayed regressors of samples at all places, shape (time, place, n)."""
-        input_map, follows = self.input_map, self.input_map.follows
+        follows = self.input_map.follows
         assert follows is not None
         back, count = follows.back, follows.place.count
         values = self.values[first - back - self.first : stop + follows.ahead - self.first]
@@ -266,7 +266,7 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        flat = input_map.columns.with_delayed(out.reshape(-1, out.shape[2]))
+        flat = self.input_map.columns.with_delayed(out.reshape(-1, out.shape[2]))
         return flat.reshape(stop - first, count, flat.shape[1])
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:

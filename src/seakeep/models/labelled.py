@@ -249,16 +249,12 @@ def check_finite(
 
 def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
     """Labels of channels as the run states them."""
-    variables = run.variables
-    attributes = [variables[channel].attrs for channel in names]
-    return tuple(
-        ChannelLabel(
-            channel,
-            str(attrs.get("units", "")),
-            str(attrs.get("long_name", channel.replace("_", " "))),
-        )
-        for channel, attrs in zip(names, attributes, strict=True)
-    )
+    labels = []
+    for channel in names:
+        attrs = run.variables[channel].attrs
+        long_name = attrs.get("long_name", channel.replace("_", " "))
+        labels.append(ChannelLabel(channel, str(attrs.get("units", "")), str(long_name)))
+    return tuple(labels)
 
 
 def common_step(runs: Datasets) -> float:

@@ -244,10 +244,9 @@ class HankelDMDcModel(Model):
                 "parameter = '…', an attribute of the runs."
             )
         coefficients, signature = self.variation.at(self.coefficients, self.signature, parameter)
-        settings = replace(self.settings, parameter="")
         return replace(
             self,
-            settings=settings,
+            settings=replace(self.settings, parameter=""),
             coefficients=coefficients,
             signature=signature,
             learnt=self,

@@ -346,8 +346,7 @@ class Live:
         None before 4 samples. Known and constant inputs are no waves: of them the mean alone is
         compared.
         """
-        taken = self._count.taken
-        if taken < 4 or not self.signature.inputs:
+        if self._count.taken < 4 or not self.signature.inputs:
             return None
         return self.model.coverage.conditions(
             self._known_inputs(), self.signature, self._surge, waves=self._waves
@@ -705,8 +704,7 @@ class Live:
             first = begins - 1 - signature.input_delays
         if stop <= first:
             return
-        taken = self._count.taken
-        begin = max(taken - self._record, 0)
+        begin = max(self._count.taken - self._record, 0)
         delayed, direct = self._rows("delayed", first, stop), self._rows("direct", first, stop)
         if self._follows is not None:
             surge = self._known_inputs("x")[:, self._follows.column]
@@ -945,9 +943,9 @@ class Live:
         """Restore what :meth:`save` wrote."""
         self._count, self._time = _Counts(**content["counts"]), content["time"]
         self._first = max(self._count.taken - self._record, 0)
-        blank = np.empty((self._history.size, len(self.signature.states)))
+        size, count = self._history.size, len(self.signature.states)
         for as_it_is in content["as_it_is"]:
-            update = _Update(blank.copy(), np.empty(blank.shape[1]))
+            update = _Update(np.empty((size, count)), np.empty(count))
             self._updates.append(None if as_it_is else update)
         parts = self._parts()
         ends = np.cumsum([part.size for part in parts])

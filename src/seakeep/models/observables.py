@@ -228,8 +228,8 @@ class Powers:
             for power in self.powers
             for place in places
         ]
-        terms = (Power(tuple(places), self.powers),)
-        return Bound(tuple(labels), terms=terms, stiffness=STIFF)
+        power = Power(tuple(places), self.powers)
+        return Bound(tuple(labels), terms=(power,), stiffness=STIFF)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""
@@ -377,8 +377,8 @@ class Observed:
         if any(getattr(each, "period", 0.0) is None for each in observables):
             period = labelled.mean_period(runs, list(inputs)) * dt
             observables = tuple(counted_in(each, period) for each in observables)
-        last = slice(None if window is None else -window, None)
-        records = [labelled.channel_matrix(run, inputs, name)[last] for name, run in runs.items()]
+        windows = labelled.last_samples(runs, window)
+        records = [labelled.channel_matrix(run, inputs, name) for name, run in windows.items()]
         spreads = np.nanstd(np.concatenate(records), axis=0)
         observed = cls(observables, labels, dt, tuple(spreads.tolist()))
         direct = np.concatenate([observed.direct(each) for each in records])

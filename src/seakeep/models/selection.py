@@ -417,7 +417,7 @@ def _problem(
         pieces = {}
         for name, run in runs.items():
             size = run.sizes["time"]
-            place = training_window(size - 1, widest.window, before, widest.history)
+            place = training_window(size - 1, widest.window, before, 0, widest.history)
             edges = np.linspace(place.first_column, size - after, folds + 1).astype(int)
             for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
                 samples = slice(first - before, stop + after)

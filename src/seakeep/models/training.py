@@ -138,8 +138,8 @@ class TrainingData:
             all_rows=settings.delay_rows == "ridge",
             radius=settings.radius,
         )
-        count, blocks = len(self.signature.states), settings.blocks
-        spread = spread_means(solution.coefficients, count, settings.state_delays, blocks)
+        count, s = len(self.signature.states), settings.state_delays
+        spread = spread_means(solution.coefficients, count, s, settings.blocks)
         return replace(solution, coefficients=spread)
 
     def training(self, solution: Solution) -> Training:
@@ -260,7 +260,7 @@ def _place(
     A step from j reads the input up to j + lead, and none after the window.
     """
     reach = settings.reach(input_map)
-    place = training_window(last, settings.window, reach, settings.history)
+    place = training_window(last, settings.window, settings.state_reach, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
     final = last - input_map.after
     shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
@@ -562,7 +562,7 @@ def scales_of(
     windows: Sequence[TrainingWindow],
     channels: Sequence[Sequence[ChannelLabel]],
     standardize: bool,
-    stretch: tuple[FloatArray, FloatArray] | None = None,
+    stretch: tuple[FloatArray, FloatArray] | None,
 ) -> tuple[Scale, Scale, Scale]:
     """Moments of states, delayed and direct regressors.
 
