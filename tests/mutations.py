@@ -400,7 +400,7 @@ CHANGES = {
         ("if dark <= self._count.unseen:", "if False:", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("inputs[begin - dark : begin, waves] = np.nan", "pass", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("outside |= Validity.LOST", "pass", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
-        ("lost[-self._begins - min(self._count.since, len(self.errors.rms)) :].any()", "lost.any()", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
+        ("lost[-self._begins - min(self._count.since, self.errors.longest) :].any()", "lost.any()", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("close_gaps(record[:, column], lost[:, column], self._gap)", "pass", "models/test_live.py::test_forecasts_read_waves_whose_short_gaps_are_closed"),
         ('[self._known_inputs(name) for name in ("u", "lost", "x")]', "[self._known_inputs()]", "models/test_live.py::test_a_restarted_process_goes_on_bit_for_bit"),
         ("max(self._pending - 1 - self.signature.input_delays, 0)", "self._pending - self.signature.input_delays", "models/test_live.py::test_a_restarted_process_goes_on_bit_for_bit"),

@@ -53,13 +53,17 @@ class LeadErrors:
     @classmethod
     def together(cls, parts: Sequence[LeadErrors]) -> LeadErrors:
         """Errors of several models, which count alike at each lead that they are known at."""
-        steps = max(len(each.rms) for each in parts)
         residual = np.mean([each.residual for each in parts], axis=0)
         reached = [
-            np.mean([each.rms[at] ** 2 for each in parts if at < len(each.rms)], axis=0)
-            for at in range(steps)
+            np.mean([each.rms[at] ** 2 for each in parts if at < each.longest], axis=0)
+            for at in range(max(each.longest for each in parts))
         ]
         return cls(residual, np.sqrt(np.maximum.accumulate(reached)))
+
+    @property
+    def longest(self) -> int:
+        """Longest lead that they are known at, samples."""
+        return len(self.rms)
 
     def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
         """Mean squares over a forecast, shape (steps, N), `since` samples after measured states."""
@@ -67,7 +71,7 @@ class LeadErrors:
 
     def at(self, leads: npt.ArrayLike) -> FloatArray:
         """RMS errors at leads (samples from 1 on), shape (…, N); held after the last."""
-        places = np.minimum(np.asarray(leads, dtype=int), len(self.rms)) - 1
+        places = np.minimum(np.asarray(leads, dtype=int), self.longest) - 1
         return self.rms[places]
 
 
@@ -126,7 +130,7 @@ Forecast = Callable[[Windows, Sequence[FittedReadOut]], FloatArray]
 def linear_errors(
     members: Sequence[Dynamics],
     stretches: Sequence[Stretch],
-    readouts: Sequence[FittedReadOut] = (),
+    readouts: Sequence[FittedReadOut],
 ) -> LeadErrors | None:
     """Errors of the mean of linear members in their training runs."""
     own = [each.signature for each in members]

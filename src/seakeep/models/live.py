@@ -264,7 +264,7 @@ class Live:
         self._innovation = np.full(count, np.nan)
         # Of squares that fade: sums, and weights; of each state, and of each in free runs.
         self._squares = np.zeros((2, 2, count))
-        free = max(CONSISTENCY, 2 * len(errors.rms))
+        free = max(CONSISTENCY, 2 * errors.longest)
         self._fade = 1.0 - 1.0 / np.array([[CONSISTENCY], [free]])
         self._free = self._history.copy()
 
@@ -369,7 +369,7 @@ class Live:
         _, lost, dark = closed
         if dark <= self._count.unseen:  # the band holds what comes of it
             lost = lost[: len(lost) - dark]
-        if lost[-self._begins - min(self._count.since, len(self.errors.rms)) :].any():
+        if lost[-self._begins - min(self._count.since, self.errors.longest) :].any():
             outside |= Validity.LOST
         alarm = self._count.doubtful > 0 or bool(np.any(self.consistency_by_state > ALARM))
         return outside | Validity.CONSISTENCY if alarm else outside
@@ -585,7 +585,7 @@ class Live:
         long as those of training on, and a history.
         """
         since = self._count.since
-        if blind and since >= len(self.errors.rms) + self.signature.state_delays:
+        if blind and since >= self.errors.longest + self.signature.state_delays:
             return
         if at < self._begins:
             self._filter.shift(np.diag(self.signature.state_scale.spread**2))
@@ -691,7 +691,7 @@ class Live:
         if not is_driven:
             sums, weights = self._squares[:, 1]
             sums += (1.0 - self._fade[1]) * (weights - sums)
-        lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
+        lead = (lead + 1) % (self.errors.longest + 1) if lead else 0
         if not lead and is_driven and (update is None or self._noise.any()):
             self._free[:], lead = self._history, 1
         self._count.lead = lead
@@ -778,7 +778,7 @@ class Live:
         closed = self._closed()
         futures, freedom, known = self._futures(count, future, closed)
         # In the dark the errors of what was filled grow as those of what is to come.
-        leads, unseen = len(self.errors.rms), min(closed.dark, self._count.unseen)
+        leads, unseen = self.errors.longest, min(closed.dark, self._count.unseen)
         dark = min(unseen, leads, self._count.taken - self._begins)
         taken = self._count.taken - dark
         history = self._rows("x", taken - signature.state_samples, taken)
@@ -858,7 +858,7 @@ class Live:
         rows were given, below zero where the last ones of the record were lost.
         """
         names, waves, (record, gone, tail) = self.signature.inputs, self._waves, closed
-        dark, light = min(tail, len(self.errors.rms)), len(record) - tail
+        dark, light = min(tail, self.errors.longest), len(record) - tail
         wanted = steps - 1 + self._ahead
         # What filled a gap that is not closed does not join the waves after it.
         before = np.flatnonzero(gone[:light].all(axis=1)).max(initial=-1) + 1
@@ -997,7 +997,7 @@ def _raised(known: DelayFilter, errors: LeadErrors) -> FloatArray:
     count, process = len(known.a), known.process
     one = DelayFilter(known.a, process, known.noise)
     one.covariance[-count:, -count:] = process
-    reached = np.diagonal(process) + one.ahead(len(errors.rms) - 1, np.ones(count)).sum(axis=0)
+    reached = np.diagonal(process) + one.ahead(errors.longest - 1, np.ones(count)).sum(axis=0)
     return np.sqrt(np.maximum(errors.rms[-1] ** 2 / np.maximum(reached, TINY), 1.0))
 
 

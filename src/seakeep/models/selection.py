@@ -779,14 +779,13 @@ def select(
             stated = float(settings.ridge)
             ridges = sorted({*RIDGES, stated} - {0.0})
         settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
-    by_sea = folds == "sea_state"
     apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
     horizons = tuple(max(round(each * samples), 1) for each in horizon)
     aligned = None if _lacking(settings, given) else settings.alignment
     # One that reads the measured surge is no choice.
     first = alignments_of(aligned, given)[0] if "alignment" in vary else aligned
     base = settings.having(readouts=(), alignment=first)
-    whole = Candidates(base, given, samples, step, vary, opened, by_sea, bool(kinds))
+    whole = Candidates(base, given, samples, step, vary, opened, folds == "sea_state", bool(kinds))
     for search in whole.shorter():
         problems = _problems(search, apart, horizons)
         if problems:
