@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal
 
-from seakeep.signals import low_pass, lowpass_taps
+from seakeep.signals import low_pass, lowpass_taps, resample
 
 
 @settings(max_examples=25)
@@ -35,3 +35,12 @@ def test_constants_and_ramps_are_kept_up_to_the_ends():
     for series in (np.full(t.size, 3.0), 2.0 * t - 1.0):
         # Point reflection continues a ramp exactly: only rounding is left.
         assert_allclose(low_pass(series, 0.01, 2.0), series, atol=1e-12)
+
+
+def test_a_coarser_record_averages_at_its_ends_too():
+    # At its end the line through ten samples has (4 n - 2) / (n (n + 1)) = 0.35 of their variance.
+    time = np.arange(400.0)
+    first = resample(np.eye(400), time, time[:391:10])[0]
+    last = resample(np.eye(400), time, time[9::10])[-1]
+    assert_allclose([first @ first, last @ last], 38 / 110, rtol=0.02)
+    assert_allclose([first @ time, last @ time], [0.0, 399.0], atol=0.01)
