@@ -91,13 +91,21 @@ def derive(
             if own.unit is not None:
                 conversion(unit, own.unit, label)
         target = units_of(name, unit)
-        values = values * conversion(unit, target, label)
+        factor = conversion(unit, target, label)
+        sources = sources_of(name, own, channels)
+        units = [channels[source].attrs["units"] for source in sources]
+        if own.expression and factor != 1 and target in units:
+            raise RequestError(
+                f"{own.expression!r} is computed from channels in SI units, some in '{target}', so "
+                f"that its result can hardly be in '{unit}'. State unit = '{target}', and leave "
+                "out of the expression what converts units."
+            )
+        values = values * factor
     attributes = {
         "units": target,
         "long_name": long_name_of(name, own.long_name),
         "derived_from": origin,
     }
-    sources = sources_of(name, own, channels)
     if own.step in ("low_pass", "band_pass") and "accuracy" in channels[sources[0]].attrs:
         attributes["accuracy"] = channels[sources[0]].attrs["accuracy"]  # the same, in a band
     out = {name: xr.Variable("time", values, attributes)}
