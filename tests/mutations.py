@@ -503,6 +503,8 @@ CHANGES = {
         ("if self.upper < other.lower:", "if self.value < other.value:", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
     ],
     "signals/calculus.py": [
+        ("out = np.clip(out, *bounds)", "out = np.clip(out, None, None)", "signals/test_calculus.py::test_gaps_have_the_waves_that_are_expected"),
+        ("noise = 1e-3 * out.std()", "noise = 0.0 * out.std()", "signals/test_calculus.py::test_gaps_have_the_waves_that_are_expected"),
         ("slopes[[0, 1, -2, -1]] = ends[[0, 1, -2, -1]]", "slopes[[0, 1]] = ends[[0, 1]]", "signals/test_calculus.py::test_a_derivative_has_no_more_noise_at_its_ends"),
         ("(own, -known)", "(own, known)", "campaign/test_steps.py::test_an_integral_is_right_beside_a_gap"),
         ("(gain / (1j * omega) ** times)", "(gain / (-1j * omega) ** times)", "signals/test_calculus.py::test_integral_of_a_wave_in_the_band"),

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from seakeep.signals import band_pass, differentiate, envelope_squared, integrate
+from seakeep.signals.calculus import expected_in_gaps
 
 DT = 0.01
 T = np.arange(0, 80, DT)
@@ -49,6 +50,19 @@ def test_a_derivative_has_no_more_noise_at_its_ends():
     noise = np.linalg.norm(differentiate(np.eye(9), 1.0), axis=1)
     assert_allclose(noise[2:-2], np.sqrt(130) / 12)
     assert noise.max() < 1.2
+
+
+def test_gaps_have_the_waves_that_are_expected():
+    t = np.arange(0, 60, 0.05)
+    waves = np.cos(np.outer(t, np.linspace(0.7, 1.6, 12)) + np.arange(12.0) ** 2).sum(axis=1)
+    for length in (8.0, 20.0):
+        lost = (t >= 30) & (t < 30 + length)
+        filled = expected_in_gaps(np.where(lost, 0.0, waves), lost)
+        assert_allclose(filled[~lost], waves[~lost], atol=1e-12)
+        if length == 8.0:
+            assert np.abs(filled - waves).max() < 0.01 * waves.std()
+        # In 20 s of 60 s what fits either side best is 68 times as high.
+        assert np.abs(filled).max() < 1.01 * np.abs(waves).max()
 
 
 def test_envelope_of_a_group():

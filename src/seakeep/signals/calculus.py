@@ -98,10 +98,13 @@ def expected_in_gaps(series: FloatArray, lost: BoolArray) -> FloatArray:
         return series
     mean, gaps = series[~lost].mean(), stretches(lost)
     out = series - mean
+    bounds = out[~lost].min(), out[~lost].max()
     order = min(4 * max(end - begin for begin, end in gaps), 2000)
     begin, end = max(stretches(~lost), key=lambda part: part[1] - part[0])
+    # Without any noise, as in a simulation, waves seem to be known for good.
+    noise = 1e-3 * out.std() * np.random.default_rng(0).standard_normal(out.size)
     for fitted in (slice(begin, max(end, begin + 16)), slice(None)):
-        whitening = autoregression(out[fitted], order)[0]
+        whitening = autoregression((out + noise)[fitted], order)[0]
         reach = whitening.size - 1
         weights = scipy.signal.oaconvolve(whitening, whitening[::-1])
         for first, after in gaps:
@@ -110,6 +113,7 @@ def expected_in_gaps(series: FloatArray, lost: BoolArray) -> FloatArray:
             known = scipy.signal.oaconvolve(near, weights, mode="valid")
             own = np.pad(weights[reach:], (0, known.size))[: known.size]
             out[first:after] = scipy.linalg.solve_toeplitz(own, -known)
+        out = np.clip(out, *bounds)  # tones fitted to a few waves resonate in a long gap
     return out + mean
 
 
