@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
+from said import request_error
 
 from seakeep import core, metrics, signals, statistics, waves
 from seakeep.arrays import (
@@ -26,28 +27,48 @@ NOISE = np.random.default_rng(0).standard_normal(T.size)
 VECTORS = 0.1 * np.stack([X, Y, X], axis=1)
 TABLE = np.stack([X, Y], axis=1)
 PULSES = np.where(T % 10 < 0.5, 1.0, 0.0)
-# Sound arguments by the name of the parameter, or of function and parameter.
 SOUND = {
-    "series": X, "time": T, "reference": Y, "reference_time": T, "new_time": T[10:-10] + 0.01,
-    "trigger": PULSES, "reference_trigger": PULSES, "first": X, "second": Y, "upstream": X,
-    "downstream": Y, "test": X, "training": [X], "elevations": {"a": X, "b": Y},
-    "positions": {"a": 0.0, "b": 1.0}, "records": {"a": X, "b": Y}, "angles": VECTORS,
-    "rates": VECTORS, "position": VECTORS, "velocity": VECTORS, "acceleration": VECTORS,
-    "angular_acceleration": VECTORS, "specific_force": VECTORS, "offset": np.ones(3),
-    "complementary_filter.position": X, "complementary_filter.acceleration": Y,
-    "predicted": TABLE, "measured": TABLE, "lower": TABLE - 1, "upper": TABLE + 1,
-    "jsd_interval.predicted": X, "jsd_interval.measured": Y, "p": np.abs(X), "q": np.abs(Y),
-    "scores": TABLE[None], "values": X, "grid": np.linspace(-3, 3, 50), "cells": TABLE[None, :9],
-    "density_grid.series": TABLE.T,
-    "block_length.series": NOISE, "split_bands.series": TABLE, "A": np.full((1, 2), 0.3),
-    "B": np.full((1, 2), 0.5), "histories": np.ones((3, 2)), "inputs": np.ones((3, 9, 2)),
-    "frequency": np.abs(X), "wavelength": 1 + np.abs(X), "split_bands.frequency": 0.2,
-    "dt": 0.05, "depth": 3.6, "separation": 1.2,
-    "stated": 1.2, "band": (0.1, 2.0), "bounds": (0.0, 1.0), "distances": (0.0, 0.5),
-    "celerity": 3.0, "passband": 2.0, "crossover": 0.1, "window": 10.0, "largest_lag": 1.0,
-    "longest": 1.0, "count": 20, "block_length": 9, "n_series": 9,
-    "rng": np.random.default_rng(0), "statistic": lambda x: x.mean(axis=(1, 2)),
-}  # fmt: skip
+    name: value
+    for names, value in {
+        "series first upstream test values": X,
+        "complementary_filter.position jsd_interval.predicted": X,
+        "reference second downstream": Y,
+        "complementary_filter.acceleration jsd_interval.measured": Y,
+        "p q frequency": np.abs(X),
+        "time reference_time": T,
+        "new_time": T[10:-10] + 0.01,
+        "trigger reference_trigger": PULSES,
+        "training": [X],
+        "elevations records": {"a": X, "b": Y},
+        "positions": {"a": 0.0, "b": 1.0},
+        "angles rates position velocity acceleration": VECTORS,
+        "angular_acceleration specific_force": VECTORS,
+        "offset": np.ones(3),
+        "predicted measured split_bands.series": TABLE,
+        "lower": TABLE - 1,
+        "upper": TABLE + 1,
+        "density_grid.series": TABLE.T,
+        "scores cells": TABLE[None, :9],
+        "grid": np.linspace(-3, 3, 50),
+        "block_length.series": NOISE,
+        "A B": np.full((1, 2), 0.3),
+        "histories": np.ones((3, 2)),
+        "inputs": np.ones((3, 9, 2)),
+        "wavelength": 1 + np.abs(X),
+        "dt": 0.05,
+        "crossover split_bands.frequency": 0.2,
+        "separation stated": 1.2,
+        "depth celerity": 3.0,
+        "passband window largest_lag longest": 2.0,
+        "band bounds distances": (0.1, 2.0),
+        "count": 20,
+        "block_length n_series": 9,
+        "rng": np.random.default_rng(0),
+        "statistic": lambda x: x.mean(axis=(1, 2)),
+    }.items()
+    for name in names.split()
+}
+"""Sound arguments by the name of the parameter, or of function and parameter."""
 ROOMS = {core.rollout, *(
     getattr(room, name) for room in (signals, statistics, metrics, waves) for name in room.__all__
 )}  # fmt: skip
@@ -113,7 +134,7 @@ def test_sound_arguments_pass_and_what_is_no_array_of_real_numbers_is_refused(na
     }.items(),
 )
 def test_what_the_message_says(values, message):
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         as_real(values, "x")
 
 

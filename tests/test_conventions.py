@@ -3,9 +3,9 @@
 import math
 
 import pytest
+from said import request_error
 
 from seakeep.conventions import MOTIONS, canonical_channel, conversion, is_elevation, si_unit
-from seakeep.errors import RequestError
 
 UNITS = {
     "m": {"m": 1.0, "mm": 1e-3, "in": 0.0254},
@@ -59,10 +59,9 @@ def test_elevations_and_their_rates_are_known_by_name():
 
 
 def test_an_angle_is_no_number_and_no_length():
-    with pytest.raises(
-        RequestError,
-        match=r"the unit 'mm' does not fit pitch, which is measured in 'rad'\. Correct the unit",
+    with request_error(
+        r"the unit 'mm' does not fit pitch, which is measured in 'rad'\. Correct the unit"
     ):
         conversion("mm", "rad", "pitch")
-    with pytest.raises(RequestError, match="does not fit the channel"):
+    with request_error("does not fit the channel"):
         conversion("-", "rad")

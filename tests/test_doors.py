@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pages import page
 from places import ROOT
 from records import record
+from said import data_error, request_error, warned
 from tutorial_study import put_tutorial
 
 import seakeep
 from seakeep import cli, formats, models, quality
 from seakeep.baselines import FIR
 from seakeep.core import Solution
-from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
 from seakeep.study import fit_baselines, read_study, run_study
@@ -83,9 +83,7 @@ def test_a_reader(add, tmp_path, name):
     run = seakeep.read_campaign(tmp_path / "campaign.toml").prepare()["a"]
     assert_allclose(run["heave"], 1e-3 * np.sin(t), rtol=1e-15)
     (tmp_path / "text.raw").write_text("time,heave\n0,1\n1,2\n")
-    with pytest.raises(
-        DataError, match=r"text\.raw is not a valid RAW file: it holds text and starts with"
-    ):
+    with data_error(r"text\.raw is not a valid RAW file: it holds text and starts with"):
         formats.read_columns(tmp_path / "text.raw")
 
 
@@ -97,7 +95,7 @@ def test_a_quality_check(add):
     assert found.text == "has an SD of 7.1e-05 m, less than 0.001 m"
     run.attrs["quality"] = as_json([found])
     assert findings_of(run) == [found]
-    with pytest.warns(SeakeepWarning, match=r"^first: heave has an SD of .*Check the gain of"):
+    with warned(r"^first: heave has an SD of .*Check the gain of"):
         warn_of([found], set())
 
 
@@ -146,12 +144,12 @@ def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add,
         ),
     )
     campaign = seakeep.read_campaign(tmp_path / "campaign.toml")
-    with pytest.warns(SeakeepWarning, match="'subspace' is left out"):
+    with warned("'subspace' is left out"):
         assert "own" not in fit_baselines(campaign, states, ["eta_fwd"])
 
     for wrong in (np.zeros((1, 2)), np.full((2, 11), np.nan)):
         Own.solve = lambda self, data, given=wrong: Solution(given, "own", 0.0, 1)
-        with pytest.raises(RequestError, match=r"'own' .*; finite ones of shape \(2, 11\) are"):
+        with request_error(r"'own' .*; finite ones of shape \(2, 11\) are"):
             Own(0, 8, 1.0).fit(run, states, ["eta_cog"])
 
     def failing(self, data):

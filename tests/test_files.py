@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from said import request_error
 
-from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, load_sealed, replacing, write_netcdf, write_sealed
 
 
@@ -42,7 +42,7 @@ def test_a_file_appears_when_it_is_whole_and_a_failure_leaves_the_old_one_and_no
 )
 def test_what_keeps_a_file_from_being_written_is_named(tmp_path, place, error, message):
     (tmp_path / "old").write_text("")
-    with pytest.raises(RequestError, match=message), replacing(tmp_path / place):
+    with request_error(message), replacing(tmp_path / place):
         raise OSError(error, os.strerror(error))
 
 
@@ -138,7 +138,7 @@ def test_an_input_is_kept_under_any_name(tmp_path):
     raw = tmp_path / "raw.csv"
     raw.write_text("time [s],heave [m]\n")
     (tmp_path / "same.csv").symlink_to(raw)
-    with pytest.raises(RequestError, match=r"same\.csv is read by this command and would be"):
+    with request_error(r"same\.csv is read by this command and would be"):
         check_output(tmp_path / "same.csv", "forecast", [raw], "time.*")
 
 
@@ -146,13 +146,13 @@ def test_a_netcdf_file_is_replaced_by_one_of_its_kind(tmp_path):
     path = tmp_path / "a.nc"
     write_netcdf(path, xr.Dataset(attrs={MARK: "model"}))
     check_output(path, "model")
-    with pytest.raises(RequestError, match="exists and is not a forecast that seakeep wrote"):
+    with request_error("exists and is not a forecast that seakeep wrote"):
         check_output(path, "forecast")
     write_netcdf(path, xr.Dataset({"heave": ("time", [1.0])}))
-    with pytest.raises(RequestError, match=r"may be a measurement\. Choose another name"):
+    with request_error(r"may be a measurement\. Choose another name"):
         check_output(path, "model")
     path.write_bytes(b"CDF\x01")
-    with pytest.raises(RequestError, match="exists and is not a model"):
+    with request_error("exists and is not a model"):
         check_output(path, "model")
 
 
@@ -169,10 +169,10 @@ def test_text_states_what_it_is_and_csv_by_its_header(tmp_path):
     path.write_text("#" * 100_000 + "\n# seakeep_file: campaign\n" + "#" * 100_000)
     check_output(path, "campaign")
     path.write_text("[campaign]\n")
-    with pytest.raises(RequestError, match="exists and is not a campaign"):
+    with request_error("exists and is not a campaign"):
         check_output(path, "campaign")
     table = tmp_path / "a.csv"
     table.write_text("run,channel\n1,2\n")
     check_output(table, "table", header="run,channel")
-    with pytest.raises(RequestError, match="exists and is not a table"):
+    with request_error("exists and is not a table"):
         check_output(table, "table", header="time,.*")

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
+from said import data_error, request_error
 
-from seakeep import DataError, RequestError, metrics
+from seakeep import metrics
 from seakeep.pairing import pair
 
 TIME = 0.5 * np.arange(6)
@@ -34,7 +35,7 @@ def test_dimensions_are_matched_by_name():
 def test_samples_are_matched_where_no_instants_are_stated():
     bare = pair(predicted=MEASURED.drop_vars("time"), measured=MEASURED)
     assert_array_equal(bare.arrays["predicted"], bare.arrays["measured"])
-    with pytest.raises(RequestError, match="measured has 6 samples along time and predicted 5"):
+    with request_error("measured has 6 samples along time and predicted 5"):
         pair(predicted=MEASURED.drop_vars("time").isel(time=slice(5)), measured=MEASURED)
 
 
@@ -62,5 +63,5 @@ def test_the_instants_of_a_message_can_be_told_apart():
     message = (
         r"from 1700000000\.25 to 1700000002\.75 s and measured from 1700000000 to 1700000002\.5"
     )
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
         pair(predicted=late.assign_coords(time=late.time + 0.25), measured=late)

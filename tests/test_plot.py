@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from ensembles import few
 from moored import moored_run
+from said import request_error
 
 import seakeep
 from seakeep import HankelDMDc
-from seakeep.errors import RequestError
 
 pytest.importorskip("matplotlib")
 
@@ -36,7 +36,7 @@ def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
     given = Figure().subplots()
     assert seakeep.plot.overlay(forecast[["heave"]], run, axes=given) is given.figure
     assert len(given.get_lines()) == 2
-    with pytest.raises(RequestError, match=r"axes holds 1 Axes and the figure draws 3 panels"):
+    with request_error(r"axes holds 1 Axes and the figure draws 3 panels"):
         seakeep.plot.overlay(forecast, run, axes=given)
 
 
@@ -46,9 +46,9 @@ def test_band_takes_members_or_their_statistics(run, model):
     for forecast in (members, ensemble.forecast_summary(run, **WHEN)):
         figure = seakeep.plot.band(forecast, run)
         assert len(figure.axes[0].collections) == 1
-    with pytest.raises(RequestError, match=r"Channels: none\. .*with seakeep\.plot\.band"):
+    with request_error(r"Channels: none\. .*with seakeep\.plot\.band"):
         seakeep.plot.overlay(members, run)
-    with pytest.raises(RequestError, match=r"measured has no channel .* in a coordinate 'time'"):
+    with request_error(r"measured has no channel .* in a coordinate 'time'"):
         seakeep.plot.band(members, run.drop_vars("time"))
-    with pytest.raises(RequestError, match=r"it has no band\. Draw it with seakeep\.plot\.overlay"):
+    with request_error(r"it has no band\. Draw it with seakeep\.plot\.overlay"):
         seakeep.plot.band(model.forecast(run, **WHEN), run)

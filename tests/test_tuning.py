@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from free_runs import loop_score
+from said import request_error
 from squared import INPUTS, PERIOD, STATES, runs
 
 import seakeep
-from seakeep import HankelDMDc, RequestError
+from seakeep import HankelDMDc
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 
@@ -241,10 +242,10 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
     longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
     for others in (runs(2), shifted, longer):  # the last two hold the same values
-        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+        with request_error("keeps scores of other runs or settings"):
             search(others, **more)
     kept.write_text("[]")
-    with pytest.raises(RequestError, match="keeps no scores of a search"):
+    with request_error("keeps no scores of a search"):
         search(runs(), **more)
 
 

@@ -56,6 +56,7 @@ class TuneResult(Selected[Any]):
     ----------
     settings : HankelDMDc, FIR, ARX or Subspace
         The settings that were chosen; another kind than the first where that is varied and better.
+        Their ``fit(runs, states, inputs)`` fits the model.
     rows : tuple of dict
         What was tried, as in :attr:`table`.
     note : str
@@ -64,11 +65,6 @@ class TuneResult(Selected[Any]):
         Read-outs of the settings that were chosen, as all training runs teach them; those that
         were chosen among have their scores.
     """
-
-    @property
-    def spec(self) -> Any:
-        """The settings; ``spec.fit(runs, states, inputs)`` fits the model."""
-        return self.settings
 
     @property
     def table(self) -> xr.Dataset:
@@ -118,7 +114,6 @@ def tune(
     *,
     stop: Stop = None,
     executor: Executor | None = None,
-    seed: int = 0,
     progress: Progress | None = None,
     resume: str | Path | None = None,
 ) -> TuneResult:
@@ -153,8 +148,6 @@ def tune(
         Last instant of the training window of the runs, s.
     executor : concurrent.futures.Executor, optional
         Works on several candidates side by side; the result is the same.
-    seed : int, optional
-        Of the bootstrap of the intervals.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     resume : str or Path, optional
@@ -198,7 +191,6 @@ def tune(
         kinds=RIVALS if "kind" in vary else (),
         executor=executor,
         progress=progress,
-        seed=seed,
         known=known,
     )
     settings, note = found.settings.having(select=None), found.note

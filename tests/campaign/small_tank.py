@@ -1,5 +1,7 @@
 """A small tank: two runs as a logger writes them, and a campaign file that reads them."""
 
+from math import tau
+
 import numpy as np
 import pandas as pd
 
@@ -9,8 +11,8 @@ DT = 0.02
 def tank_columns(seed=0, seconds=20.0):
     """Time (s), wave (mm), heave (mm), pitch (deg), acceleration (m/s²) of a made-up run."""
     t = DT * np.arange(int(seconds / DT) + 1)
-    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 5)
-    omega = 2 * np.pi * np.array([0.5, 0.6, 0.7, 0.8, 0.9])
+    phase = np.random.default_rng(seed).uniform(0, tau, 5)
+    omega = tau * np.array([0.5, 0.6, 0.7, 0.8, 0.9])
     waves = np.cos(omega * t[:, None] + phase)
     return {
         "Time [s]": t,

@@ -1,5 +1,6 @@
 """Every reader fed what is no run: one error that says what it is and how to fix it."""
 
+import os
 import re
 import shutil
 
@@ -9,11 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
+from said import data_error, request_error, warned
 from scipy import io
-from small_tank import CAMPAIGN, tank_columns, write_csv
+from small_tank import tank_columns, write_csv
 
-from seakeep.campaign import read_campaign, read_table
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.campaign import read_table
+from seakeep.errors import MissingFileError
 
 T = 0.05 * np.arange(400)
 HEAVE = np.sin(T)
@@ -70,9 +72,7 @@ def test_truncated(path, part):
         return  # below: a text that is cut off is one still
     whole = path.read_bytes()
     path.write_bytes(whole[: int(part * len(whole))])
-    with pytest.raises(
-        DataError, match=r"run\..*cut off.*(Copy|copy|Save it again|Export it again|was not closed)"
-    ):
+    with data_error(r"run\..*cut off.*(Copy|copy|Save it again|Export it again|was not closed)"):
         read_table(path)
 
 
@@ -85,10 +85,10 @@ def test_a_text_cut_off_within_its_last_line(tmp_path, left):
     path.write_text("\n".join([*lines[:200], last[:left]]))
     if left > last.index(","):
         shown = re.escape(repr(last[:left].split(",")[1].strip()))
-        with pytest.warns(SeakeepWarning, match=f"ends within line 201, at {shown}: it seems"):
+        with warned(f"ends within line 201, at {shown}: it seems"):
             read_table(path)
     else:
-        with pytest.raises(DataError, match=r"line 201: 1 cells where .* the file was cut off"):
+        with data_error(r"line 201: 1 cells where .* the file was cut off"):
             read_table(path)
     path.write_text("\n".join([*lines[:200], last]))  # whole, without an end: no word
     assert read_table(path).sizes["time"] == 200
@@ -101,10 +101,9 @@ def test_text_under_the_name_of_a_binary_format(path, encoding):
     if path.suffix == ".csv":
         assert read_table(path)["vinkel"].attrs["units"] == "°"
         return
-    with pytest.raises(
-        DataError,
-        match=r"run\..* is not a valid (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and "
-        r"starts with 'tid \[s\],vinkel .*If it is a table, name it \.csv or \.txt; else copy or",
+    with data_error(
+        r"run\..* is not a valid (MATLAB|NetCDF|HDF5|TDMS|MCAP) file: it holds text and "
+        r"starts with 'tid \[s\],vinkel .*If it is a table, name it \.csv or \.txt; else copy or"
     ):
         read_table(path)
 
@@ -118,35 +117,38 @@ def test_a_sound_file_under_another_name_is_recognised(tmp_path, kind, suffix):
     assert_array_equal(read_table(path)["heave"], HEAVE)
 
 
-# Runs and files that state different units.
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no FIFO")
+def test_whatever_a_path_names_the_error_says_its_reason(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "run.csv").write_text("t,h\n")
+    for name, reason in {
+        "run.csv/more.csv": "does not exist: there is no folder",
+        "pipe.csv": r"pipe\.csv is a pipe or a device, and only regular",
+    }.items():
+        with pytest.raises(MissingFileError, match=reason):
+            read_table(tmp_path / name)
 
 
-def prepared(tank, header, text=CAMPAIGN):
-    columns = tank_columns(1)
-    size = {"cm": 0.1, "m": 1e-3}.get(header, 1.0)
-    heave = columns.pop("Heave [mm]") * size
-    columns[f"Heave [{header}]" if header else "Heave"] = heave
-    write_csv(tank / "second.csv", columns)
-    (tank / "campaign.toml").write_text(text)
-    return read_campaign(tank / "campaign.toml").prepare()
+def test_a_stated_unit_against_a_header(tank, changed):
+    stated = 'column = "Heave"', 'column = "Heave"\nunit = "mm"'
 
+    def prepared(header, *more):
+        columns = tank_columns(1)
+        heave = {"m": 1e-3}.get(header, 1.0) * columns.pop("Heave [mm]")
+        columns[f"Heave [{header}]" if header else "Heave"] = heave
+        write_csv(tank / "second.csv", columns)
+        return changed(stated, *more).prepare()
 
-def test_a_stated_unit_against_a_header(tank):
-    text = CAMPAIGN.replace('column = "Heave"', 'column = "Heave"\nunit = "mm"')
-    assert "second" in prepared(tank, "mm", text)
-    assert "second" in prepared(tank, "-", text)
-    assert "second" in prepared(tank, "", text)
+    for header in ("mm", "-", ""):
+        assert "second" in prepared(header)
     for header in ("m", "deg"):
-        with pytest.raises(
-            RequestError,
-            match=rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
+        with request_error(
+            rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
             rf"says '{header}' for the column 'Heave'\. Leave unit out where the files say it; "
-            r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]",
+            r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]"
         ):
-            prepared(tank, header, text)
-    mended = text.replace(
-        "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
-    )
-    with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
-        runs = prepared(tank, "deg", mended)  # millimetres, now said to be metres
+            prepared(header)
+    mended = "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
+    with warned(r"heave leaves its mean by .* Check unit"):
+        runs = prepared("deg", mended)  # millimetres, now said to be metres
     assert runs["second"]["heave"].std() > 1.0

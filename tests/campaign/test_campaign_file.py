@@ -1,6 +1,7 @@
 """What a campaign file may say, and the words of the messages where it says something else."""
 
 import pytest
+from said import request_error
 from small_tank import CAMPAIGN
 
 from seakeep.campaign import read_campaign
@@ -213,14 +214,12 @@ def test_named_models_are_found_by_their_names(changed):
     band = campaign.model("band")
     assert band.inputs == ()
     assert band.arguments() == {"ridge": {"log_uniform": (0.1, 1)}, "n_members": 10}
-    with pytest.raises(
-        RequestError, match=r"no table \[models\.bnad\]\. Did you mean 'band'\? Named models: s"
-    ):
+    with request_error(r"no table \[models\.bnad\]\. Did you mean 'band'\? Named models: s"):
         campaign.model("bnad")
-    with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
+    with request_error(r"no table \[model\]\. Name one of small, band\."):
         campaign.model()
 
 
 def test_a_campaign_without_a_model_says_so(changed):
-    with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
+    with request_error(r"no table \[model\]\. Add \[model\] with 'states'"):
         changed((CAMPAIGN[CAMPAIGN.index("[model]") :], "")).model()

@@ -4,36 +4,30 @@ import re
 
 import numpy as np
 import pytest
+from said import data_error, warned
 from seas import sea
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError
 from seakeep.quality import findings_of
 from seakeep.signals import encounter_period
 
 POOLED = ("sampling_rate = 10", "steps_per_period = 12")
-CUT = "Time [s],WP fwd [mm],Heave [mm],Pitch (deg),acc [g]\n0.0,1.0,2.0\n"
+CUT = b"Time [s],WP fwd [mm],Heave [mm],Pitch (deg),acc [g]\n0.0,1.0,2.0\n"
 NOTE = (
     r"run 'second' is left out of the encounter period: .*second\.csv.*"
     r"Once it is repaired, prepare again; or state role = 'unused' in \[runs\.second\]"
 )
 
 
-def damage(tank, how):
-    path = tank / "second.csv"
-    if how == "missing":
-        path.unlink()
-    else:
-        path.write_bytes({"cut": CUT.encode(), "empty": b"", "noise": bytes(range(256))}[how])
-
-
-@pytest.mark.parametrize("how", ["cut", "empty", "noise", "missing"])
-def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, tank, how):
+@pytest.mark.parametrize("content", [CUT, b"", bytes(range(256)), None])
+def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, tank, content):
     campaign = changed(POOLED)
     both = campaign.encounter_period()
-    damage(tank, how)
-    with pytest.warns(SeakeepWarning, match=NOTE):
+    damaged, kept = tank / "second.csv", tank / "prepared/first.nc"
+    damaged.unlink() if content is None else damaged.write_bytes(content)
+    with warned(NOTE):
         run = campaign.prepare(["first"])["first"]
     alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
     assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
@@ -41,15 +35,14 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     told = [each for each in findings_of(run) if each.kind.word == "left out"]
     assert [each.channel for each in told] == ["run second"]
     assert "run 'second' is left out of the encounter period" in told[0].text
-    refused, kept = RequestError if how == "missing" else DataError, tank / "prepared/first.nc"
-    written = []
+    refused, written = RequestError if content is None else DataError, []
     # The others are kept, fresh as long as the damage is the same.
     for work in (write_prepared, load_prepared, write_prepared):
         with pytest.raises(refused, match=r"second\.csv"):
             work(campaign)
         written.append(kept.stat().st_mtime_ns)
     assert len(set(written)) == 1
-    write_csv(tank / "second.csv", tank_columns(1))
+    write_csv(damaged, tank_columns(1))
     write_prepared(campaign)
     assert kept.stat().st_mtime_ns > written[0]
     left_out = findings_of(load_prepared(campaign)["first"])
@@ -60,7 +53,7 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
 def test_the_commands(edited, tank, command):
     """prepare keeps what it can and ends with the error; fit and forecast of others run."""
     path = edited(POOLED)
-    damage(tank, "cut")
+    (tank / "second.csv").write_bytes(CUT)
     out, told = command("prepare", path, status=1)
     assert "prepared/first.nc" in out
     assert "second.nc" not in out
@@ -79,11 +72,11 @@ def test_the_commands(edited, tank, command):
 def test_every_bad_file_is_named(changed, tank):
     campaign = changed()
     (tank / "first.csv").write_text("")
-    damage(tank, "cut")
-    with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
+    (tank / "second.csv").write_bytes(CUT)
+    with data_error(r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         write_prepared(campaign)
     campaign = changed(POOLED)
-    with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
+    with data_error(r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         campaign.encounter_period()
 
 
@@ -123,14 +116,12 @@ def test_pooled_drifts(tmp_path):
     campaign = read_campaign(path)
     whole = campaign.clocks()["r0"]["loads"]
     (tmp_path / "loads_2.csv").write_text("time,wave,load\n0.0,1.0\n")
-    with pytest.warns(
-        SeakeepWarning, match=r"run 'r2' is left out of the pooled clock drifts: .*loads_2\.csv"
-    ):
+    with warned(r"run 'r2' is left out of the pooled clock drifts: .*loads_2\.csv"):
         left = campaign.clocks(["r0"])["r0"]["loads"]
     assert "drift of 3 runs" in whole.describe()
     assert "drift of 2 runs" in left.describe()
-    with pytest.warns(SeakeepWarning, match="'r2' is left out"):
+    with warned("'r2' is left out"):
         run = campaign.prepare(["r0"])["r0"]
     assert "run 'r2' is left out of the pooled clock drifts" in run.attrs["quality"]
-    with pytest.raises(DataError, match=r"loads_2\.csv"):
+    with data_error(r"loads_2\.csv"):
         campaign.clocks()

@@ -1,26 +1,30 @@
 """Drafts of campaign files: they must be read and prepared as they are."""
 
+from math import tau
+
 import numpy as np
 import pytest
+from numpy.random import default_rng
+from said import request_error
 from scipy import io
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
-from seakeep.errors import RequestError
 
 
-def drafted(folder, files):
-    text = draft_campaign(files, folder)
-    path = folder / "campaign.toml"
-    path.write_text(text, "utf-8")
-    return text, read_campaign(path)
+@pytest.fixture
+def drafted(tmp_path):
+    """Draft of files, or of one with the columns that are given: its text, and its campaign."""
 
+    def draft(given):
+        files = given if isinstance(given, list) else [write_csv(tmp_path / "run.csv", given)]
+        path, text = tmp_path / "campaign.toml", draft_campaign(files, tmp_path)
+        path.write_text(text, "utf-8")
+        return text, read_campaign(path)
 
-def drafted_of(folder, columns):
-    """Draft of a single file."""
-    return drafted(folder, [write_csv(folder / "run.csv", columns)])
+    return draft
 
 
 GUESSES = {
@@ -67,10 +71,10 @@ def test_guesses(logger):
 def regular(folder, name, period, height=20, seed=0, begin=-20.0, rate=25):
     """A regular run as a tank records it: still water, waves at the probe, then at the vessel."""
     t = np.arange(0, 60, 1 / rate)
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
 
     def wave(start, phase):
-        ramp, angle = np.clip((t - start) / (2 * period), 0, 1), 2 * np.pi * (t - start) / period
+        ramp, angle = np.clip((t - start) / (2 * period), 0, 1), tau * (t - start) / period
         return ramp * (np.sin(angle + phase) + 0.1 * np.sin(2 * angle))
 
     response = 1 / (1 + (1.2 / period) ** 4)
@@ -83,23 +87,23 @@ def regular(folder, name, period, height=20, seed=0, begin=-20.0, rate=25):
     return write_csv(folder / f"{name}.csv", {"Time [s]": t + 5} | noisy)
 
 
-def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
+def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path, drafted):
     files = [regular(tmp_path, f"run{i}", T, rate=200) for i, T in enumerate((1.5, 0.6, 1.0))]
     still = {"Time [s]": np.arange(0, 40, 0.005)}
-    random = np.random.default_rng(0)
+    random = default_rng(0)
     still |= {name: random.normal(0, 0.2, 8000) for name in ("WP fwd [mm]", "Heave [mm]")}
     files.append(write_csv(tmp_path / "still.csv", still))  # still water has no waves
-    text, campaign = drafted(tmp_path, files)
+    text, campaign = drafted(files)
     rate = campaign.settings.preparation.sampling_rate
     assert rate == pytest.approx(200 / 3, rel=1e-5)  # 40 samples in 0.6 s; each fourth made 30
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
 
 
-def test_a_draft_asks_whether_slow_files_count_milliseconds(tmp_path):
+def test_a_draft_asks_whether_slow_files_count_milliseconds(drafted):
     for rate, asks in ((50, False), (0.05, True)):
         t = np.arange(600) / rate
-        wave = {"t": t, "WP fwd [mm]": np.sin(2 * np.pi * np.arange(600) / 30)}
-        text, _ = drafted_of(tmp_path, wave)
+        wave = {"t": t, "WP fwd [mm]": np.sin(tau * np.arange(600) / 30)}
+        text, _ = drafted(wave)
         assert f"# the files have {rate} samples per second" in text
         assert ("time_unit = 'ms'" in text) is asks
 
@@ -107,13 +111,13 @@ def test_a_draft_asks_whether_slow_files_count_milliseconds(tmp_path):
 @pytest.mark.parametrize(
     ("header", "factor"), [("t_DAQ", 1), ("QTM_time", 1), ("DAQ time_ms", 1e3)]
 )
-def test_times_that_jitter_are_told_by_a_word_of_their_name(tmp_path, header, factor):
+def test_times_that_jitter_are_told_by_a_word_of_their_name(drafted, header, factor):
     """A carriage that moves evenly before them in the file is none."""
     columns = tank_columns()
     even = columns.pop("Time [s]")
-    jitter = np.random.default_rng(0).uniform(-0.004, 0.004, even.size)
+    jitter = default_rng(0).uniform(-0.004, 0.004, even.size)
     content = {"carriage": 1.5 * even, header: factor * (even + jitter), **columns}
-    text, campaign = drafted_of(tmp_path, content)
+    text, campaign = drafted(content)
     assert campaign.settings.files.time == header
     assert campaign.settings.files.sampling_rate is None
     assert "# the files have 50.0" in text
@@ -122,32 +126,30 @@ def test_times_that_jitter_are_told_by_a_word_of_their_name(tmp_path, header, fa
 def test_a_draft_of_structs_says_how_to_save_them(tmp_path):
     t = 0.02 * np.arange(1000)
     io.savemat(tmp_path / "run.mat", {"time": t, "waves": {"eta": t}, "motion": {"heave": t}})
-    with pytest.raises(
-        RequestError, match=r"'waves' is a struct .*\. Save .* one struct of vectors"
-    ):
+    with request_error(r"'waves' is a struct .*\. Save .* one struct of vectors"):
         draft_campaign([tmp_path / "run.mat"])
 
 
-def test_a_draft_without_waves_says_so(tmp_path):
+def test_a_draft_without_waves_says_so(tmp_path, drafted):
     path = regular(tmp_path, "a", 1.6)
     path.write_text(path.read_text("utf-8").replace("WP fwd", "CH7"), "utf-8")
-    text, _ = drafted(tmp_path, [path])
+    text, _ = drafted([path])
     assert "inputs = [] # CORRECT IT: no name tells the waves" in text
 
 
-def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):
+def test_motions_are_the_states_and_loads_are_named_beside_them(drafted):
     columns = tank_columns()
     columns["Tension_SB [N]"] = columns["Heave [mm]"]
     columns["Acc z [g]"] = columns.pop("acc [g]")
-    text, campaign = drafted_of(tmp_path, columns)
+    text, campaign = drafted(columns)
     assert campaign.model().states == ("heave", "pitch")
     assert campaign.model().preset == "recommended"
     assert "# Loads (mooring_starboard) may be added to the states" in text
     only = {k: v for k, v in columns.items() if k.split()[0] in ("Time", "WP", "Acc", "Tension_SB")}
-    _, campaign = drafted_of(tmp_path, only)
+    _, campaign = drafted(only)
     assert campaign.model().states == ("heave_acceleration",)
     only.pop("Acc z [g]")
-    _, campaign = drafted_of(tmp_path, only)
+    _, campaign = drafted(only)
     assert campaign.model().states == ("mooring_starboard",)
 
 
@@ -176,11 +178,11 @@ def loggers(folder, run, seed, pattern):
     "pattern", ["{run}/{logger}.csv", "{run}/{run}_{logger}.csv", "{run}_{logger}.csv"]
 )
 @pytest.mark.parametrize("runs", [("a1", "b2", "regular_3"), ("a1",)])
-def test_files_of_several_loggers(tmp_path, pattern, runs):
+def test_files_of_several_loggers(tmp_path, drafted, pattern, runs):
     if len(runs) == 1 and pattern == "{run}_{logger}.csv":
         runs = ("a1", "a2")
     files = [f for i, run in enumerate(runs) for f in loggers(tmp_path, run, i, pattern)]
-    text, campaign = drafted(tmp_path, files)
+    text, campaign = drafted(files)
     assert campaign.runs == list(runs)
     assert set(campaign.files_of("a1")) == {"wave_probes", "mru"}
     assert list(campaign.settings.channels) == ["eta_us_1", "eta_us_2", "heave", "pitch_rate"]
@@ -197,11 +199,11 @@ def test_files_of_several_loggers(tmp_path, pattern, runs):
 
 
 @pytest.mark.parametrize("lost", [20, 200])  # of 1001 samples: a channel with gaps, and none
-def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
+def test_what_has_long_gaps_is_left_out_with_a_word(drafted, lost):
     columns = tank_columns() | {"WP 2 [mm]": tank_columns()["WP fwd [mm]"]}
     for name in ("Heave [mm]", "WP 2 [mm]"):
         columns[name] = np.where(np.arange(1001) // lost == 3, np.nan, columns[name])
-    text, campaign = drafted_of(tmp_path, columns)
+    text, campaign = drafted(columns)
     assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
     assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
     assert text.count("NOT RECOGNISED") == 1
@@ -213,14 +215,14 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
         assert said in text
 
 
-def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
+def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted):
     """Regular and still runs are recognised; the last file is no test for being the last."""
     files = [write_csv(tmp_path / f"a{i}.csv", tank_columns(i, 60.0)) for i in range(3)]
     files += [regular(tmp_path, "b0", 1.5)]
     still = {name: 1e-3 * each for name, each in tank_columns(9, 60.0).items()}
     still["Time [s]"] *= 1e3
     files += [write_csv(tmp_path / "c_decay.csv", still)]
-    text, campaign = drafted(tmp_path, files)
+    text, campaign = drafted(files)
     runs = campaign.settings.runs
     assert [runs[n].waves for n in ("a0", "b0", "c_decay")] == ["irregular", "regular", None]
     assert {n: run.role for n, run in runs.items()} == {
@@ -228,7 +230,7 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
     }  # fmt: skip
     assert 'waves = "regular" # guessed from its spectrum' in text
     assert 'role = "unused" # guessed: no waves were found, as in still water, decay tests' in text
-    text, _ = drafted(tmp_path, [files[0], files[-1]])
+    text, _ = drafted([files[0], files[-1]])
     assert 'role = "train" # the only run to train on\n' in text
 
 
@@ -236,21 +238,21 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
     ("dead", "beside"),
     [("constant", True), ("noise", True), ("hum", True), ("constant", False), ("noise", False)],
 )
-def test_a_dead_probe_shows_no_waves_and_drives_nothing(tmp_path, dead, beside):
+def test_a_dead_probe_shows_no_waves_and_drives_nothing(drafted, dead, beside):
     """Mains hum of 50 Hz at 50 samples per second is as slow as a wave."""
     columns = tank_columns(0, 60.0)
     t, heave = columns["Time [s]"], columns["Heave [mm]"]
-    series = {"constant": 0 * t + 3, "noise": np.random.default_rng(0).normal(0, 0.2, t.size),
-              "hum": 0.2 * np.sin(2 * np.pi * 50.3 * t)}  # fmt: skip
+    series = {"constant": 0 * t + 3, "noise": default_rng(0).normal(0, 0.2, t.size),
+              "hum": 0.2 * np.sin(tau * 50.3 * t)}  # fmt: skip
     waves = {"WP 1 [mm]": series[dead]} | ({"WP 2 [mm]": columns["WP fwd [mm]"]} if beside else {})
-    text, campaign = drafted_of(tmp_path, {"Time [s]": t, **waves, "Heave [mm]": heave})
+    text, campaign = drafted({"Time [s]": t, **waves, "Heave [mm]": heave})
     assert campaign.settings.runs["run"].waves == ("irregular" if beside else None)
     assert campaign.model().inputs == (("eta_2",) if beside else ("eta_1",))
     assert ("# eta_1 left out: next to no motion beside the others" in text) is beside
     assert ("STATE IT: no wave was found" in text) is not beside
 
 
-def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path):
+def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path, drafted):
     """Neither the shortest nor the longest, nor a repeated one; from when the waves have come."""
     series = {"a": (1.0, 20), "b": (1.2, 24), "b_2": (1.2, 24), "c": (1.35, 22), "d": (1.5, 24),
               "d_2": (1.5, 24), "d_high": (1.5, 36), "e": (1.9, 20)}  # fmt: skip
@@ -258,7 +260,7 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path)
         regular(tmp_path, name, *of, seed, 12.0 + seed / 10)
         for seed, (name, of) in enumerate(series.items())
     ]
-    text, campaign = drafted(tmp_path, files)
+    text, campaign = drafted(files)
     runs = campaign.settings.runs
     assert campaign.test_runs == ["c"]
     why = "guessed: one run whose waves lie within those of the others tests, these train"
@@ -269,7 +271,7 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path)
         "b": "waves of b", "b_2": "waves of b", "d": "waves of d", "d_2": "waves of d"
     }  # fmt: skip
     assert text.count("# guessed: the same waves come again\n") == 4
-    text, _ = drafted(tmp_path, [files[0], files[4]])
+    text, _ = drafted([files[0], files[4]])
     assert "# guessed: no waves lie within those of the others; the nearest run tests" in text
 
 
@@ -279,8 +281,7 @@ def test_init_keeps_how_files_are_read(tmp_path, command):
     rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
     head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
     path.write_text("\n".join([*head, *rows, ""]), "utf-8")
-    drafted, _ = command("init", path)
-    assert 'column = "Welle_1"' in drafted
+    assert 'column = "Welle_1"' in command("init", path)[0]
     out = tmp_path / "campaign.toml"
     options = ["--skip-rows", "2", "--delimiter", "tab", "--decimal", ","]
     for status, more in ((0, []), (2, []), (0, ["--force"])):  # then it is there

@@ -5,10 +5,10 @@ import pytest
 import two_loggers
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
+from said import request_error
 from tutorial_study import TUTORIAL
 
 import seakeep
-from seakeep import RequestError
 from seakeep.formats import read_columns
 
 
@@ -77,7 +77,7 @@ def test_a_chain_that_was_saved_goes_on_to_the_last_bit(campaign, rows, tmp_path
     assert late.push({"": between(rows, 0, 10)}).sizes["time"] > 0
     rig = seakeep.read_campaign(two_loggers.write(tmp_path))
     other = rig.live_chain("one", delay=2.0, window=20.0)
-    with pytest.raises(RequestError, match="a chain with other loggers, columns or steps"):
+    with request_error("a chain with other loggers, columns or steps"):
         whole.resume(other.save(tmp_path / "other.nc"))
 
 
@@ -105,7 +105,7 @@ def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):
         sending = rows if first < 20 else ["probes"]
         chain.push({key: between(rows[key], first, first + 4) for key in sending})
     size = len(chain._rows["probes"]["p1"])
-    with pytest.raises(RequestError, match=r"'mru' has sent nothing for .* NaN in its columns"):
+    with request_error(r"'mru' has sent nothing for .* NaN in its columns"):
         chain.push({"probes": between(rows["probes"], 36, 48)})
     assert len(chain._rows["probes"]["p1"]) == size  # nothing was taken
     lost = {

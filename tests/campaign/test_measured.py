@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from said import warned
 
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
-from seakeep.errors import SeakeepWarning
 
 pytestmark = pytest.mark.data
 FLUME, BASIN = "ntnu_ship_section", "sjtu_semisub"
@@ -35,7 +35,7 @@ def test_draft(tmp_path, name):
     if name == FLUME:  # files are called PERIOD and HEIGHT_REPETITION
         assert campaign.test_runs == ["3041_2"]  # T 1.21 s, between 1.158 and 1.238 s
         assert campaign.settings.runs["3041_2"].span[0] > 25  # until then the water is still
-    told = pytest.warns(SeakeepWarning, match="wm_position is taken as")
+    told = warned("wm_position is taken as")
     with told if bare else contextlib.nullcontext():
         used = [n for n, each in campaign.settings.runs.items() if each.role != "unused"]
         runs = campaign.prepare(used[:3])

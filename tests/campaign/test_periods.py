@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import xarray as xr
+from said import request_error
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep.campaign import read_campaign
-from seakeep.errors import RequestError
 from seakeep.models.settings import periods_to_samples
 from seakeep.quality import findings_of
 from seakeep.study import fit_campaign
@@ -67,9 +67,9 @@ def test_a_span_that_runs_backwards_in_any_run_stops_all(changed, key, use):
     campaign = changed(irregular, backwards)
     work = {"read_run": lambda: campaign.read_run("first"),
             "prepare": lambda: campaign.prepare(["first"])}[use]  # fmt: skip
-    with pytest.raises(RequestError, match=rf"^runs\.second\.{key}: received \[12.0, 7 T\]"):
+    with request_error(rf"^runs\.second\.{key}: received \[12.0, 7 T\]"):
         work()
-    with pytest.raises(RequestError, match=r"runs\.second.*with an encounter period of 1\.6 s is "
+    with request_error(r"runs\.second.*with an encounter period of 1\.6 s is "
                                            r"\[12, 11\.2\]"):  # fmt: skip
         changed(STATED, irregular, backwards)
 

@@ -5,11 +5,11 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
+from said import data_error, warned
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep.campaign import draft_campaign, read_campaign
-from seakeep.errors import DataError, SeakeepWarning
 from seakeep.quality import findings_of
 
 LOGGERS = """
@@ -85,7 +85,7 @@ def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared
     words = (
         r"^second: file is one of first too, and both use it from 2 s to 18 s\. Correct it in \["
     )
-    with pytest.warns(SeakeepWarning, match=words) if shared else nullcontext():
+    with warned(words) if shared else nullcontext():
         runs = campaign.prepare()
     found = [each for each in findings_of(runs["second"]) if each.kind.name == "FILE"]
     assert [(each.place, each.value) for each in found] == ([shared] if shared else [])
@@ -99,7 +99,7 @@ def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
     )
     copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
     campaign.path.write_text(text.replace("[preparation]", copied), "utf-8")
-    with pytest.warns(SeakeepWarning, match="^second: file is one of first too"):
+    with warned("^second: file is one of first too"):
         assert "file" in kinds(read_campaign(campaign.path).prepare()["second"])
 
 
@@ -140,17 +140,16 @@ def test_times_that_may_count_samples(first, tank, header, files, is_said):
         del columns["Time [s]"]
         write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
     stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
-    warned = pytest.warns(SeakeepWarning, match=r"state sampling_rate \(Hz\) in \[files\]")
-    with warned if is_said else nullcontext():
+    expected = warned(r"state sampling_rate \(Hz\) in \[files\]")
+    with expected if is_said else nullcontext():
         run = first(stated, ("sampling_rate = 10", ""))
     assert ("counted" in kinds(run)) is is_said
 
 
 def test_a_motion_from_a_column_of_waves(first):
-    with pytest.warns(
-        SeakeepWarning,
-        match=r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
-        r"Correct column in \[channels\.heave\]",
+    with warned(
+        r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
+        r"Correct column in \[channels\.heave\]"
     ):
         assert "wave column" in kinds(first(('column = "Heave"', 'column = "WP fwd"')))
     assert "wave column" not in kinds(first())
@@ -181,17 +180,16 @@ def filtered(edges):
 def test_a_low_pass_that_removes_the_waves_is_named(first):
     """Waves of 0.5 to 0.9 Hz: the first filter leaves all of them, the second none."""
     assert not kinds(first(filtered([2.0, 3.0])))
-    with pytest.warns(
-        SeakeepWarning,
-        match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
-        r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
+    with warned(
+        r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
+        r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]"
     ):
         assert "low pass" in kinds(first(filtered([0.17, 0.33])))
 
 
 def test_a_low_pass_longer_than_the_record(first):
     """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
-    with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
+    with data_error(r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
         first(filtered([2.0, 2.1]))
 
 
@@ -201,7 +199,7 @@ def test_a_low_pass_longer_than_the_record(first):
      ((3.0, 20.0), "starts at 3 s, the other loggers at 0 s", (10.0, 20.0))],
 )  # fmt: skip
 def test_a_logger_that_was_cut_off_is_told(loggers, ends, words, span):
-    with pytest.warns(SeakeepWarning, match=f"first: mru {words}"):
+    with warned(f"first: mru {words}"):
         run = loggers(*ends).prepare()["first"]
     assert [text.startswith(words) for _, text in told(run, RECORDS)] == [True]
     assert run.attrs["test_span"] == pytest.approx(span)
@@ -221,7 +219,7 @@ def test_a_test_part_without_samples_is_an_error(loggers, test):
     """It would else be judged on the part that trains."""
     campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
     message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
         campaign.prepare()
 
 
@@ -256,7 +254,7 @@ def test_a_count_that_noise_leads_is_told(changed, tank, noise, seconds, part):
         write_csv(tank / f"{name}.csv", columns)
     message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s"
     rest = r"( \(second likewise\))?\. .*period_hysteresis"
-    with pytest.warns(SeakeepWarning, match=message + rest):
+    with warned(message + rest):
         run = changed(COUNTED).prepare()["first"]
     assert run.attrs["encounter_period"] < sound / part
     assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
@@ -271,7 +269,7 @@ def test_a_count_that_noise_leads_is_told(changed, tank, noise, seconds, part):
 def test_values_that_nothing_afloat_reaches(changed, tank, stem, header, message):
     columns = tank_columns(0)
     write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
-    with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
+    with warned(message + r"\. Check unit and column in \[channe"):
         runs = changed().prepare()
     assert kinds(runs["first"]) & {"impossible", "out of water"}
     assert not kinds(runs["second"])
@@ -282,7 +280,7 @@ def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(tank):
     columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
     bare, path = write_csv(tank / "bare.csv", columns), tank / "draft.toml"
     path.write_text(draft_campaign([bare], tank), "utf-8")
-    with pytest.warns(SeakeepWarning, match="pitch is taken as rad, .*remove unit_as"):
+    with warned("pitch is taken as rad, .*remove unit_as"):
         run = read_campaign(path).prepare()["bare"]
     assert "unit" in kinds(run)
     edit(path, ("unit_assumed = true", ""))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from said import warned
 from seas import sea
 from small_tank import write_csv
 
@@ -49,7 +50,7 @@ def campaign(tmp_path):
 
 
 def test_a_wrong_position_is_warned_of_once_and_is_a_finding_of_every_run(campaign):
-    with pytest.warns(seakeep.SeakeepWarning, match="one: eta_fwd is stated to stand") as caught:
+    with warned("one: eta_fwd is stated to stand") as caught:
         runs = campaign(48.24).prepare()
     assert len(caught) == 1
     text = str(caught[0].message)

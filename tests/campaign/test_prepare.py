@@ -1,13 +1,15 @@
 """From files to analysis-ready runs."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error, request_error, warned
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError
 from seakeep.files import write_netcdf
 from seakeep.signals import (
     band_pass,
@@ -63,7 +65,7 @@ def test_a_number_for_no_reading_is_a_gap_of_channels_alone(changed, tank, numbe
     columns["Heave [mm]"][7:9] = number, np.float32(number)
     write_csv(tank / "first.csv", columns)
     campaign = changed(("[rig]", f"[files]\nmissing = {number}\n\n[rig]"))
-    with pytest.raises(DataError, match=r"'heave' has 2 missing values .* first at t = 0\.14 s"):
+    with data_error(r"'heave' has 2 missing values .* first at t = 0\.14 s"):
         campaign.read_run("first")
 
 
@@ -97,6 +99,14 @@ def test_prepared_runs(campaign):
     assert second.attrs["test_span"] == (2.0, 18.0)
     assert "train_span" not in second.attrs
     assert first["pitch_rate"].attrs["derived_from"] == "pitch, differentiated"
+
+
+def test_each_file_is_parsed_once(changed, monkeypatch):
+    """Although the encounter period is measured on all runs before the first is prepared."""
+    parsed, read_csv = [], pd.read_csv
+    monkeypatch.setattr(pd, "read_csv", lambda *a, **k: parsed.append(1) or read_csv(*a, **k))
+    assert len(changed(("sampling_rate = 10", "steps_per_period = 32")).prepare()) == 2
+    assert len(parsed) == 2
 
 
 def test_the_whole_record_is_resampled_and_then_cut(campaign):
@@ -170,10 +180,9 @@ def test_steps_of_files_that_differ_are_refused(edited, tank):
     edited(("sampling_rate = 10", ""))
     columns = {name: each[::2] for name, each in tank_columns(1).items()}
     write_csv(tank / "second.csv", columns)
-    with pytest.raises(
-        RequestError,
-        match=r"the runs differ in rate: 'first' has a step of 0\.02 s and 'second' one of "
-        r"0\.04 s\. State sampling_rate",
+    with request_error(
+        r"the runs differ in rate: 'first' has a step of 0\.02 s and 'second' one of "
+        r"0\.04 s\. State sampling_rate"
     ):
         read_campaign(tank / "campaign.toml").prepare()
 
@@ -204,7 +213,7 @@ def test_still_water_before_the_waves_does_not_count(tank, changed):
     assert found == pytest.approx(encounter_period(waves, DT), rel=0.02)
     campaign = changed(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
     # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
-    with pytest.warns(SeakeepWarning, match=r"counts waves of 3\.\d+ s, and the energy period"):
+    with warned(r"counts waves of 3\.\d+ s, and the energy period"):
         assert campaign.encounter_period() > 1.1 * encounter_period(waves, DT)
 
 
@@ -214,16 +223,14 @@ def test_a_period_needs_a_wave_channel(changed):
         ("[channels.eta_fwd]", "[channels.probe]"),
         ("eta_fwd = -2.5", ""),
     )
-    with pytest.raises(
-        RequestError, match=r"no wave channel to take the encounter period from. State encounter"
-    ):
+    with request_error(r"no wave channel to take the encounter period from. State encounter"):
         campaign.encounter_period()
 
 
 def test_still_water_has_no_period(tank):
     for name in ("first.csv", "second.csv"):
         campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), name)
-    with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
+    with data_error("run 'first', channel 'eta_fwd': the record of 20"):
         campaign.encounter_period()
     # A constant channel is kept all the same: whether it serves is the model's business.
     assert campaign.prepare(["first"])["first"]["eta_fwd"].std() == 0.0
@@ -297,7 +304,7 @@ def test_a_file_at_fault(campaign, tank, change, error, message):
     ],
 )
 def test_a_campaign_at_fault(changed, old, new, message):
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         changed((old, new)).prepare()
 
 
@@ -309,7 +316,7 @@ def test_a_gap_is_cut_off(tank, changed):
 
 def test_a_variable_in_a_path(edited, monkeypatch):
     path = edited(('file = "second.csv"', 'file = "${TANK_FILES}/second.csv"'))
-    with pytest.raises(RequestError, match=r"has no run 'secnd'\. Did you mean 'second'"):
+    with request_error(r"has no run 'secnd'\. Did you mean 'second'"):
         read_campaign(path).prepare(["secnd"])
     monkeypatch.setenv("TANK_FILES", str(path.parent))
     assert read_campaign(path).prepare(["second"])
@@ -375,7 +382,7 @@ def test_a_measurement_is_never_overwritten(tank, changed):
         (tank / "other", r"first\.nc exists and is not a prepared run that"),
     ):
         (folder / "first.nc").write_bytes(b"CDF")
-        with pytest.raises(RequestError, match=message):
+        with request_error(message):
             write_prepared(campaign, folder, ["first"])
         assert (folder / "first.nc").read_bytes() == b"CDF"
 
@@ -384,7 +391,7 @@ def test_a_file_that_was_cut_off_is_made_anew(campaign):
     path = write_prepared(campaign, names=["second"])["second"]
     (expected,) = load_prepared(campaign, names=["second"]).values()
     path.write_bytes(path.read_bytes()[:-1])
-    with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
+    with warned(r"second\.nc was cut off, altered"):
         (run,) = load_prepared(campaign, names=["second"]).values()
     xr.testing.assert_identical(run, expected)
 
@@ -400,5 +407,5 @@ def test_a_span_to_the_end_of_the_record(tank, first):
         ]
         run = first(*pairs)
         assert run.attrs["test_span"][1] == pytest.approx(float(run["time"][-1]))
-    with pytest.raises(RequestError, match=r"first\.test: received \[10, 20\.1\] s, and"):
+    with request_error(r"first\.test: received \[10, 20\.1\] s, and"):
         first(("test = [10, inf]", "test = [10, 20.1]"))

@@ -1,6 +1,7 @@
 """Steps of the chain through a campaign file, against bodies, tones and clocks that are known."""
 
 from functools import cache
+from math import tau
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ ARM = np.array([-1.2, 0.3, -0.1])  # from the centre of gravity to the bow, in t
 
 def body(t):
     """Displacement of the centre of gravity, and roll, pitch and yaw, of a body in waves."""
-    w = 2 * np.pi * np.array([0.45, 0.6, 0.75])
+    w = tau * np.array([0.45, 0.6, 0.75])
     position = np.column_stack([0.05 * np.sin(w[0] * t), 0.02 * np.sin(w[1] * t + 1),
                                 0.04 * np.sin(w[2] * t + 2)])  # fmt: skip
     angles = np.column_stack([0.03 * np.sin(w[2] * t), 0.12 * np.sin(w[1] * t + 0.4),
@@ -196,7 +197,7 @@ def test_the_paper_preset_of_the_preparation(tmp_path):
     text = f"[campaign]\nencounter_period = {PERIOD}\n[preparation]\npreset = 'paper'\n"
     for f in (0.61, 5.0, 7.7, 9.9, 11.0, 30.0):
         name = f"tone_{f:g}".replace(".", "p")
-        columns[f"{name} [m]"] = np.cos(2 * np.pi * f * t)
+        columns[f"{name} [m]"] = np.cos(tau * f * t)
         text += f"[channels.{name}]\n"
     run = prepared(tmp_path, columns, text, t)
     assert run.attrs["preparation_preset"] == "paper"
@@ -216,7 +217,7 @@ def two_probes(folder, positions, spans=""):
     """A long wave that passes two probes, one after the other, at 2 m/s, and at first at 2.5."""
     t = np.arange(0, 120, 0.05)
     late = np.where(t < 60, 0.4, 0.5) if spans else 0.5
-    waves = 0.05 * np.sin(2 * np.pi * 0.78 * t), 0.05 * np.sin(2 * np.pi * 0.78 * (t - late))
+    waves = 0.05 * np.sin(tau * 0.78 * t), 0.05 * np.sin(tau * 0.78 * (t - late))
     text = (
         f"[rig]\nwater_depth = 3.6\n[rig.positions]\n{positions}\n[channels.eta_a]\n"
         f"[channels.eta_b]\n[runs.r]\nwaves = 'regular'\n{spans}"

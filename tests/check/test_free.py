@@ -1,15 +1,17 @@
 """Modes and decay of systems whose law is known."""
 
+from math import tau
+
 import numpy as np
 import pytest
 import scipy
 from oscillators import Oscillator
 from records import record
+from said import data_error, warned
 
 from seakeep import BayesianHankelDMDc, HankelDMDc, LogUniform, check
 from seakeep.check.parts import samples_in
 from seakeep.core.extremes import free_decay
-from seakeep.errors import DataError, SeakeepWarning
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
 
@@ -25,20 +27,21 @@ def measured_decay_run():
     return record(DT, {"waves": "still"}, heave=found.y[0])
 
 
+def fitted(ratio, centre=0):
+    spec = HankelDMDc(0, 0, 1e-9, centre=centre)
+    return spec.fit(Oscillator(ratio, DT).run(2000), ["heave", "heave_rate"], ["eta_fwd"])
+
+
 @pytest.fixture(scope="module")
 def model():
-    return HankelDMDc(0, 0, 1e-9).fit(
-        Oscillator(dt=DT).run(2000), ["heave", "heave_rate"], ["eta_fwd"]
-    )
+    return fitted(RATIO)
 
 
 @pytest.mark.parametrize("ratio", [RATIO, 0.3])
 def test_the_decay_of_an_oscillator_is_its_own(ratio):
     """δ = 2πζ/√(1 − ζ²): with ζ = 0.3 a division by 2π alone is 5 % too large."""
-    run = Oscillator(ratio, DT).run(2000)
-    spec = HankelDMDc(0, 0, 1e-9, centre=100 if ratio == RATIO else 0)
-    found = check.decay(spec.fit(run, ["heave", "heave_rate"], ["eta_fwd"]))
-    period = 2 * np.pi / (FREQUENCY * np.sqrt(1 - ratio**2))
+    found = check.decay(fitted(ratio, 100 if ratio == RATIO else 0))
+    period = tau / (FREQUENCY * np.sqrt(1 - ratio**2))
     # Extremes between samples by a parabola: (ωΔt)²/12 of a step; fewer of them with ζ = 0.3.
     assert found.period[0] == pytest.approx(period, rel=1e-3)
     alone = free_decay(found.displacement[0].values, DT)
@@ -53,9 +56,7 @@ def test_modes_say_which_states_take_part(model):
     # Heave and its rate hold half of the energy each.
     assert found.participation[0].values == pytest.approx([0.5, 0.5], abs=0.01)
     assert found.participation.sum("state").values == pytest.approx(1.0)
-    states = ["heave", "heave_rate"]
-    overdamped = HankelDMDc(0, 0, 1e-9).fit(Oscillator(2.0, DT).run(2000), states, ["eta_fwd"])
-    real = check.modes(overdamped)
+    real = check.modes(fitted(2.0))  # overdamped
     slow, fast = FREQUENCY * (2 - 3**0.5), FREQUENCY * (2 + 3**0.5)
     assert real.decay_time.values == pytest.approx([1 / slow, 1 / fast], rel=1e-4)  # the ridge
     # The eigenvector (1, λ) and the left one, (λ', −1) of the other, give λ' and −λ.
@@ -67,7 +68,7 @@ def test_quadratic_damping_is_found_from_a_decay(model):
     assert found.motion.item() == "heave"
     # Equivalent linearisation: p = 2πζ, q = 8b/3, to second order in the damping, of which large
     # swings, which count most, have more.
-    assert found.p[0] == pytest.approx(2 * np.pi * 0.02, rel=0.03)
+    assert found.p[0] == pytest.approx(tau * 0.02, rel=0.03)
     assert found.q[0] == pytest.approx(8 / 3 * 0.3, rel=0.05)
 
 
@@ -89,7 +90,7 @@ def test_a_decay_is_the_same_however_long_the_record_goes_on(model, released):
     runs["after the release"] = released.sel(time=slice(9, 60))
     found = check.measured_decay(model, runs)
     # Five repetitions of the noise scatter by 0.2 % and 1 % (one SD).
-    assert found.period.values == pytest.approx(2 * np.pi / FREQUENCY, rel=0.008)
+    assert found.period.values == pytest.approx(tau / FREQUENCY, rel=0.008)
     assert found.damping_ratio.values == pytest.approx(0.06, rel=0.03)
     assert abs(found.q).max() < 0.03  # of a p of 0.38
     assert len(set(found.cycles.values)) == 1
@@ -97,7 +98,7 @@ def test_a_decay_is_the_same_however_long_the_record_goes_on(model, released):
 
 def test_a_run_in_which_nothing_was_released_is_no_decay(model, released):
     calm = released.sel(time=slice(150, 190))
-    with pytest.warns(SeakeepWarning, match="no decay from calm: .*Was anything released"):
+    with warned("no decay from calm: .*Was anything released"):
         found = check.measured_decay(model, {"calm": calm, "released": released})
     assert found.run.values == ["released"]
     refused = {
@@ -105,7 +106,7 @@ def test_a_run_in_which_nothing_was_released_is_no_decay(model, released):
         r"waves = 'still' and role = 'test' .*unused": released.assign_attrs(waves=""),
     }
     for words, run in refused.items():
-        with pytest.raises(DataError, match=words):
+        with data_error(words):
             check.measured_decay(model, {"run": run})
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy
+from numpy.random import default_rng
 from records import record
 from seas import sea
 
@@ -15,7 +16,7 @@ def sea_run(height=0.04, period=2.0, seed=0, **attrs):
     """A narrow sea, and a heave that follows it a sample later."""
     waves = sea(seed, (0.8 / period, 1.2 / period), period, 60).at(0.1 * np.arange(3000))
     wave = height / 4 * waves / waves.std()
-    noise = 1e-5 * np.random.default_rng(seed).standard_normal(3000)
+    noise = 1e-5 * default_rng(seed).standard_normal(3000)
     heave = 0.8 * np.roll(wave, 1) + noise
     attrs = {"encounter_period": period, "waves": "irregular", "water_depth": np.inf, **attrs}
     return record(0.1, attrs, eta=wave, heave=heave)
@@ -32,7 +33,7 @@ def model(train):
 
 
 def test_weibull_is_that_of_scipy():
-    peaks = 2.0 * np.random.default_rng(0).weibull(1.7, 400)
+    peaks = 2.0 * default_rng(0).weibull(1.7, 400)
     found = fit_weibull(peaks)
     shape, _, scale = scipy.stats.weibull_min.fit(peaks, floc=0)
     # scipy keeps the bias of maximum likelihood, and stops at 1e-4.
@@ -41,7 +42,7 @@ def test_weibull_is_that_of_scipy():
 
 
 def test_intervals_of_the_extreme_cover_as_they_say():
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     true = 2.0 * np.log(1000) ** (1 / 1.7)
     inside = []
     for _ in range(500):
@@ -83,7 +84,7 @@ def test_noise_of_a_sensor_makes_no_peaks(model):
     run = sea_run(seed=3)
     run["heave"] = run.heave + 5.0
     noise = 0.2 * float(run.heave.std())
-    run["heave"] = run.heave + noise * np.random.default_rng(0).standard_normal(3000)
+    run["heave"] = run.heave + noise * default_rng(0).standard_normal(3000)
     run.heave.attrs = {"units": "m", "noise_std": noise}
     found = check.statistics(model, {"test": run}).sel(state="heave")
     # 150 waves, of which a band of 0.4 SD hides a few; noise without the band makes a third more.

@@ -1,11 +1,13 @@
 """Response of a model and of a measurement: exact where the law is known, sure where it is not."""
 
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
 from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run
 from moored import moored_run
+from numpy.random import default_rng
 from records import record
 from seas import Sea
 
@@ -29,8 +31,8 @@ def phasors(found):
 
 def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, **attrs):
     """Waves past two probes, and a heave that answers them by :func:`answer`."""
-    rng, f = np.random.default_rng(seed), np.asarray(frequencies)
-    waves = Sea(f, 0.02 * np.ones(f.size), rng.uniform(0, 2 * np.pi, f.size), DEPTH)
+    rng, f = default_rng(seed), np.asarray(frequencies)
+    waves = Sea(f, 0.02 * np.ones(f.size), rng.uniform(0, tau, f.size), DEPTH)
     time, of = DT * np.arange(samples), answer(f)
     answered = replace(waves, amplitude=0.02 * abs(of), phase=waves.phase + np.angle(of))
     attrs = {"water_depth": DEPTH, "encounter_period": 1.6, **attrs}
@@ -43,7 +45,7 @@ def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, **attrs):
 
 @pytest.fixture(scope="module")
 def sea():
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     return vessel_run(rng.uniform(0.3, 0.9, 60), run="sea", waves="irregular")
 
 
@@ -61,7 +63,7 @@ def test_the_response_is_that_of_python_control(rows):
     model = spec.fit(moored_run(), ["surge", "heave", "pitch"], ["eta"])
     found = check.response(model, FREQUENCIES)
     system = model.to_control()
-    known = control.frequency_response(system, 2 * np.pi * FREQUENCIES).frdata
+    known = control.frequency_response(system, tau * FREQUENCIES).frdata
     # The same matrices, solved in another order: rounding times the condition of the system.
     assert np.abs(phasors(found) - known).max() < 1e-9 * np.abs(known).max()
 
@@ -70,7 +72,7 @@ def test_the_response_is_what_a_free_run_settles_to():
     lead = HankelDMDc(2, 4, 0.1, delay_rows="exact", lead=3)
     model = lead.fit(moored_run(), ["surge", "heave"], ["eta"])
     t = 0.1 * np.arange(-900, 900)
-    wave = 1e-3 * np.cos(2 * np.pi * 0.8 * t)
+    wave = 1e-3 * np.cos(tau * 0.8 * t)
     rest = np.tile(model.state_mean, (900, 1))
     forecast = model.forecast_arrays(rest, wave[:900, None], wave[900:, None], 800)
     found = check.response(model, [0.8]).isel(input=0, frequency=0)
@@ -92,7 +94,7 @@ def test_a_passing_wave_adds_the_probes(sea, model):
 
 
 def test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum(model):
-    rng = np.random.default_rng(8)
+    rng = default_rng(8)
     inside = []
     for seed in range(5):
         waves = 0.3 + 0.6 * rng.beta(2.0, 3.0, 300)
@@ -115,7 +117,7 @@ def test_a_rate_of_an_elevation_is_no_reference(sea):
 def test_measured_phases_count_from_the_waves_where_the_vessel_is():
     spec = HankelDMDc(2, 4, 0.1, alignment=FOLLOWED, delay_rows="exact")
     model = spec.fit(drifting_run(), STATES, INPUTS)
-    time, rng = DT * np.arange(1200), np.random.default_rng(0)
+    time, rng = DT * np.arange(1200), default_rng(0)
     wave = Sea(np.array([0.7]), np.array([0.02]), np.array([1.0]), DEPTH)
     vessel = POSITIONS["eta_cog"] + 0.6  # m: half a wave of 3.2 m is 1.6
     channels = {name: wave.at(time, x) for name, x in POSITIONS.items()}
@@ -150,9 +152,9 @@ def test_accuracy_of_the_instruments_widens_the_interval(model):
 
 
 def test_intervals_of_a_harmonic_fit_cover_as_they_say():
-    rng = np.random.default_rng(5)
+    rng = default_rng(5)
     time = DT * np.arange(900)
-    wave = np.cos(2 * np.pi * 0.5 * time)
+    wave = np.cos(tau * 0.5 * time)
     truth = 0.7 * np.exp(0.4j)
     clean = (truth * np.exp(2j * np.pi * 0.5 * time)).real
     many = clean[:, None] + 0.3 * rng.standard_normal((900, 500))

@@ -1,5 +1,7 @@
 """Mean drift and slow response of a model whose law is known."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from records import record
@@ -19,16 +21,18 @@ def drifting_run(samples=2000, waves=None, **attrs):
     if waves is None:
         wave = 0.45 * sea(0, (0.7, 1.3), PERIOD, 40).at(time)
     else:
-        wave = 0.5 * np.cos(2 * np.pi * waves * time)
+        wave = 0.5 * np.cos(tau * waves * time)
     surge = signal.lfilter([0.0, GAIN], [1.0, -MEMORY], wave**2)
     return record(DT, {"encounter_period": PERIOD, **attrs}, eta=wave, surge=surge)
 
 
+SQUARE = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
+REGULAR = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
+
+
 def test_drift_of_a_square_is_its_own():
-    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
-    model = spec.fit(drifting_run(), ["surge"], ["eta"])
-    regular = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
-    settled = regular.isel(time=slice(300, None))
+    model = SQUARE.fit(drifting_run(), ["surge"], ["eta"])
+    settled = REGULAR.isel(time=slice(300, None))
     found = check.drift(model, {"sea": drifting_run(), "regular": settled})
     # η² has the mean a²/2, and a²/2 cos Δt of each wave of a pair: G = 0.3 / (e^{iΔ} − 0.9).
     turn = np.exp(2j * np.pi * found.difference.values * DT)
@@ -46,10 +50,8 @@ def test_drift_is_counted_from_the_rest_in_the_wind_of_the_run():
         run = run.assign(wind=run.eta.copy(data=wind), surge=run.surge + moved)
         return run.isel(time=slice(300, None))  # settled
 
-    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
-    model = spec.fit(blown(drifting_run(), 4.0), ["surge"], ["eta", "wind"])
-    regular = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
-    found = check.drift(model, {"regular": blown(regular, 7.0)})
+    model = SQUARE.fit(blown(drifting_run(), 4.0), ["surge"], ["eta", "wind"])
+    found = check.drift(model, {"regular": blown(REGULAR, 7.0)})
     law = 0.5 * GAIN / (1.0 - MEMORY)
     assert found.slow_response.values[0, 0] == pytest.approx(law, rel=1e-4)  # the ridge
     assert found.offset[0, 0] == pytest.approx(law, rel=1e-2)  # windows of whole periods
@@ -67,7 +69,7 @@ def test_slow_squares_answer_by_their_filter():
     lag = np.arange(-15, 16)
     pole = model.A[0, 0]
     for difference, row in zip(found.difference.values[1:], slow, strict=True):
-        turn = 2 * np.pi * difference * DT
+        turn = tau * difference * DT
         filtered = abs(np.sum(kernel * np.exp(-1j * turn * lag)))
         ratio = filtered * abs((1 - pole) / (np.exp(1j * turn) - pole))
         assert row[0] / mean[0] == pytest.approx(ratio, rel=1e-2)

@@ -85,7 +85,7 @@ def test_training_is_judged_apart(model, runs, checked):
 
 
 def worded(found, **more):
-    return check_sections(replace(Checked({"worth": found}, {}, {}), **more))[0].points
+    return check_sections(Checked({"worth": found}, {}, {}, **more))[0].points
 
 
 def test_a_baseline_that_is_lost_does_not_count_and_is_named(model, runs, baselines):

@@ -102,7 +102,7 @@ def test_forecast_goes_beyond_the_waves_when_it_may_predict_them(run):
 
 
 def test_the_margin_of_a_calibrated_band_is_that_of_the_ensemble(run, place):
-    """What is printed, and what `compare` makes of it: `tests/docs/test_tutorial.py`."""
+    """What is printed, and what `compare` makes of it: `tests/docs/test_pages.py`."""
     calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o wide.nc"
     out, _ = run(f"{calibrate} --level 0.9 --scale constant")
     assert "Margin of the 90 % band, from 3 windows of 200 instants (unseen)" in out

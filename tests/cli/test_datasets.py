@@ -7,9 +7,9 @@ import threading
 from dataclasses import replace
 
 import pytest
+from said import data_error, request_error
 
 from seakeep.campaign import datasets
-from seakeep.errors import DataError, RequestError
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_fetch_takes_the_first_address_that_has_the_file_resumes_and_repairs(ups
 def test_an_altered_file_upstream_is_refused_and_nothing_is_written(upstream, tmp_path):
     folder, dataset = upstream
     (folder / "a.csv").write_bytes(b"something else")
-    with pytest.raises(DataError, match=r"a\.csv was received with another SHA-256 .* upstream ch"):
+    with data_error(r"a\.csv was received with another SHA-256 .* upstream ch"):
         datasets.fetch(dataset, tmp_path)
     assert list((tmp_path / "toy").iterdir()) == []
 
@@ -63,7 +63,7 @@ def test_an_altered_file_upstream_is_refused_and_nothing_is_written(upstream, tm
 def test_a_cut_download_is_no_file_and_the_next_source_is_tried(upstream, tmp_path):
     _, dataset = upstream
     whole = dataset.sources[-1]
-    with pytest.raises(RequestError, match=r"a\.csv could not be fetched\. Tried: .*Incomplete"):
+    with request_error(r"a\.csv could not be fetched\. Tried: .*Incomplete"):
         datasets.fetch(replace(dataset, sources=[f"{whole}/cut"]), tmp_path)
     assert list((tmp_path / "toy").iterdir()) == []
     datasets.fetch(replace(dataset, sources=[f"{whole}/cut", whole]), tmp_path)

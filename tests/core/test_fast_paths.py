@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from matrices import Problem
 from numpy.testing import assert_allclose
 
-from seakeep.core import embed, rollout
+from seakeep.core import rollout
 from seakeep.core.embedding import TrainingWindow
-from seakeep.core.gram import gram_trace, lagged_sums
+from seakeep.core.gram import gram_trace
 
 ROLLOUT = sys.modules["seakeep.core.rollout"]
 
@@ -28,7 +28,7 @@ def problems(draw):
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     N, Q, D = draw(st.integers(1, 3)), draw(st.integers(0, 3)), draw(st.integers(0, 3))
     s, z = draw(st.integers(0, 6)), draw(st.integers(0, 6))
-    made = Problem([], [], [], [], s, z)
+    runs = []
     for _ in range(draw(st.integers(1, 3))):
         count = draw(st.integers(1, 40))
         before, after = draw(st.integers(0, 3)), draw(st.integers(0, 3))
@@ -37,11 +37,8 @@ def problems(draw):
         x, u, d = (rng.normal(size=(length, width)) for width in (N, Q, D))
         # A gap where no snapshot reaches is none of our business.
         x[: first - s], u[: first - z], d[:first] = np.nan, np.nan, np.nan
-        made.states.append(x)
-        made.inputs.append(u)
-        made.direct.append(d)
-        made.windows.append(TrainingWindow(first, first + count, first))
-    return made
+        runs.append((x, u, d, TrainingWindow(first, first + count, first)))
+    return Problem(*zip(*runs, strict=True), s, z)
 
 
 @given(problems())
@@ -75,21 +72,6 @@ def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
     expected = targets @ right[:kept].T / values[:kept] @ left[:, :kept].T
     found = problem.solved(0.0, rank=rank).coefficients
     assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
-
-
-@given(
-    st.integers(0, 2**32 - 1),
-    st.integers(1, 30),
-    st.integers(1, 4),
-    st.integers(1, 300),
-    st.integers(1, 5),
-)
-def test_lagged_sums_are_products_with_a_hankel_matrix(seed, count, channels, lags, rows):
-    rng = np.random.default_rng(seed)
-    series = rng.normal(size=(count + lags + 1, channels))
-    left = rng.normal(size=(count, rows))
-    hankel = embed(series, lags - 1, lags, count)
-    assert_allclose(lagged_sums(left, series, lags, lags), left.T @ hankel.T, atol=TIGHT)
 
 
 def stepwise(a, b, state, inputs, delays, direct, count):

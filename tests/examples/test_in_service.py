@@ -27,11 +27,13 @@ def test_the_c_estimator_is_python_where_a_tenth_is_lost(make_run, tmp_path):
     assert outside == 0
 
 
+PLAN = loaded(EXAMPLES / "known_actuator/plan.py")
+
+
 def drifting(seed):
     """A surge of 40 s, driven by slow noise, and waves that do little to it."""
     rng, dt, samples = np.random.default_rng(seed), 0.1, 4000
-    example = loaded(EXAMPLES / "known_actuator/plan.py")
-    a, b = example.thruster(dt)
+    a, b = PLAN.thruster(dt)
     slow = signal.lfilter([0.005], [1, -0.995], rng.standard_normal(samples))
     moved = np.zeros((samples, 2))
     for k in range(samples - 1):
@@ -45,11 +47,10 @@ def drifting(seed):
 
 
 def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():
-    example = loaded(EXAMPLES / "known_actuator/plan.py")
-    model = example.fit({str(seed): drifting(seed) for seed in (1, 2)})
+    model = PLAN.fit({str(seed): drifting(seed) for seed in (1, 2)})
     away = {}
     for plans in (False, True):
-        surge = example.play(model, drifting(3), plans) - model.state_scale.centre[0]
+        surge = PLAN.play(model, drifting(3), plans) - model.state_scale.centre[0]
         away[plans] = np.sqrt(np.mean(surge**2))
     # A plan of another sign or another instant pushes it away.
     assert away[True] < 0.7 * away[False]

@@ -90,16 +90,19 @@ def test_any_order_of_arrival_within_patience_gives_the_same_estimates(model, ru
 
 def test_what_is_lost_is_estimated_and_counted(model, run):
     """A stamp an hour ahead, one that comes late, a value that is none, and messages never sent."""
-    odd = {("heave", 20): (3600.0, 0.0), ("pitch", 25): (0.0, 0.5), ("eta_cog", 30): (0.0, 0.5)}
+    odd = {  # what comes later, how much later its stamp is, and a factor of its value
+        ("heave", 20): (0.0, 3600.0, 1.0),
+        ("pitch", 25): (0.5, 0.0, 1.0),
+        ("eta_cog", 30): (0.5, 0.0, 1.0),
+        ("heave", 35): (0.0, 0.0, np.nan),
+    }
     sent, kept = [], []
-    for number, (arrival, channel, stamp, value) in enumerate(messages(model, run)):
-        ahead, late = odd.get((channel, number // 4), (0.0, 0.0))
-        if (channel, number // 4) == ("heave", 35):
-            value = np.nan
-        elif not ahead + late and number // 4 != 40:
-            kept.append((arrival, channel, stamp, value))
-        if number // 4 != 40:
-            sent.append((arrival + late, channel, stamp + ahead, value))
+    for each in messages(model, run, [*range(40), *range(41, COUNT)]):
+        arrival, channel, stamp, value = each
+        late, ahead, factor = odd.get((channel, round((stamp - CLOCK) / DT)), (0.0, 0.0, 1.0))
+        sent.append((arrival + late, channel, stamp + ahead, factor * value))
+        if sent[-1] == each:
+            kept.append(each)
     follower = Follower(model.live)
     found = play(follower, sent)
     assert len(found) == COUNT

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error, request_error, warned
 
 from seakeep.campaign import read_table
 from seakeep.campaign.readers import checksum
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 pytest.importorskip("rosbags")
 
@@ -92,7 +92,7 @@ def test_a_standard_message(tmp_path, plugin, what):
 def test_the_times_of_reception_on_request(tmp_path):
     run = read_table(save(tmp_path, mru=imu), FileSettings(time="receive_time"))
     assert_allclose(run["time"], T, atol=1e-12)
-    with pytest.raises(RequestError, match="the column 'time' cannot be a channel"):
+    with request_error("the column 'time' cannot be a channel"):
         read_table(tmp_path / "bag", FileSettings(time="receive_time"), columns=["time"])
 
 
@@ -106,26 +106,25 @@ def test_a_message_of_ones_own(tmp_path):
 
 def test_topics(tmp_path):
     path = save(tmp_path, mru=imu, load=number, note=text)
-    with pytest.raises(
-        RequestError,
-        match=r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
-        r"messages\), '/mru' .*State which one with group = 'TOPIC'",
+    with request_error(
+        r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
+        r"messages\), '/mru' .*State which one with group = 'TOPIC'"
     ):
         read_table(path)
     assert list(read_table(path, FileSettings(group="/load")).data_vars) == ["data"]
-    with pytest.raises(RequestError, match=r"no topic '/lod'\. Did you mean '/load'\? Its topics"):
+    with request_error(r"no topic '/lod'\. Did you mean '/load'\? Its topics"):
         read_table(path, FileSettings(group="/lod"))
-    with pytest.raises(DataError, match=r"the topic '/note' .* holds no numbers"):
+    with data_error(r"the topic '/note' .* holds no numbers"):
         read_table(path, FileSettings(group="/note"))
 
 
 def test_headers_that_are_not_stamped(tmp_path):
     path = save(tmp_path, mru=lambda i: imu(i, stamped=False))
-    with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):
+    with warned("the headers of the topic '/mru' are not stamped"):
         run = read_table(path)
     assert_allclose(run["time"], T, atol=1e-12)
     path = save(tmp_path / "some", rig=lambda i: rig(i, stamped=i > 4))
-    with pytest.raises(DataError, match="5 of 100 messages of the topic '/rig' have no stamp"):
+    with data_error("5 of 100 messages of the topic '/rig' have no stamp"):
         read_table(path)
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from said import request_error
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import RequestError
 
 nptdms = pytest.importorskip("nptdms")
 
@@ -20,20 +20,23 @@ def channel(name, values, group="run", **properties):
     return nptdms.ChannelObject(group, name, values, properties=properties)
 
 
-def save(folder, *channels):
-    path = folder / "run.tdms"
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment([nptdms.RootObject(), *channels])
-    return path
+@pytest.fixture
+def read(tmp_path):
+    """Read channels from a file, by stated settings."""
+
+    def table(*channels, **stated):
+        with nptdms.TdmsWriter(tmp_path / "run.tdms") as writer:
+            writer.write_segment([nptdms.RootObject(), *channels])
+        return read_table(tmp_path / "run.tdms", FileSettings(**stated))
+
+    return table
 
 
-def test_waveforms(tmp_path):
-    path = save(
-        tmp_path,
+def test_waveforms(read):
+    run = read(
         channel("heave", HEAVE, **WAVEFORM),
         channel("wave", WAVE, **{**WAVEFORM, "unit_string": "m"}),
     )
-    run = read_table(path)
     # The file holds a step, not times: both are its multiples up to rounding.
     assert_allclose(run["time"], 2.5 + T, rtol=1e-15)
     assert_array_equal(run["heave"], HEAVE)
@@ -41,28 +44,25 @@ def test_waveforms(tmp_path):
     assert (run["heave"].attrs["units"], run["wave"].attrs["units"]) == ("mm", "m")
 
 
-def test_a_time_channel_and_integers(tmp_path):
-    path = save(
-        tmp_path,
+def test_a_time_channel_and_integers(read):
+    run = read(
         channel("Time", 1e3 * T, unit_string="ms"),
         channel("count", np.arange(200, dtype=np.int16)),
         channel("remark", ["x"] * 200),
     )
-    run = read_table(path)
     assert_allclose(run["time"], T, rtol=1e-12)
     assert_array_equal(run["count"], np.arange(200.0))
     assert set(run.data_vars) == {"count"}
 
 
-def test_time_stamps_count_from_the_first(tmp_path):
+def test_time_stamps_count_from_the_first(read):
     start = np.datetime64("2024-05-06T07:08:09.000000")
     stamps = start + (1e6 * T).round().astype("timedelta64[us]")
-    path = save(tmp_path, channel("Time", stamps), channel("heave", HEAVE))
-    # Time stamps are written in microseconds here.
-    assert_allclose(read_table(path)["time"], T, atol=1e-6)
+    run = read(channel("Time", stamps), channel("heave", HEAVE))
+    assert_allclose(run["time"], T, atol=1e-6)  # they are written in microseconds
 
 
-def test_scaled_channels(tmp_path):
+def test_scaled_channels(read):
     """Counts with a linear scale in the properties are read in the scale's unit."""
     scale = {
         "NI_Number_Of_Scales": 1,
@@ -72,22 +72,18 @@ def test_scaled_channels(tmp_path):
         "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
         "wf_increment": STEP,
     }
-    path = save(tmp_path, channel("load", np.arange(200, dtype=np.int32), **scale))
-    assert_array_equal(read_table(path)["load"], 10 + 0.5 * np.arange(200))
+    run = read(channel("load", np.arange(200, dtype=np.int32), **scale))
+    assert_array_equal(run["load"], 10 + 0.5 * np.arange(200))
 
 
-def test_groups(tmp_path):
-    path = save(
-        tmp_path,
-        channel("heave", HEAVE, **WAVEFORM),
-        channel("load", np.arange(2000.0), "loads", wf_increment=0.005),
-    )
-    with pytest.raises(
-        RequestError,
-        match=r"several groups that are sampled differently: 'loads' \(1 channels of 2000\), 'run' "
-        r"\(1 channels of 200\)\. State which one with group = 'NAME'",
+def test_groups(read):
+    loads = channel("load", np.arange(2000.0), "loads", wf_increment=0.005)
+    both = channel("heave", HEAVE, **WAVEFORM), loads
+    with request_error(
+        r"several groups that are sampled differently: 'loads' \(1 channels of 2000\), 'run' "
+        r"\(1 channels of 200\)\. State which one with group = 'NAME'"
     ):
-        read_table(path)
-    assert read_table(path, FileSettings(group="loads")).sizes["time"] == 2000
-    with pytest.raises(RequestError, match=r"no group 'load'\. Did you mean 'loads'\? Its groups"):
-        read_table(path, FileSettings(group="load"))
+        read(*both)
+    assert read(*both, group="loads").sizes["time"] == 2000
+    with request_error(r"no group 'load'\. Did you mean 'loads'\? Its groups"):
+        read(*both, group="load")

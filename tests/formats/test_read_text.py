@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error, request_error, warned
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.formats import read_columns
 
 PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
@@ -18,10 +18,16 @@ PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.
 ROWS = PLAIN.split("\n", 1)[1]
 
 
-def write(folder, text, name="run.csv", encoding="utf-8"):
-    path = folder / name
-    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
-    return path
+@pytest.fixture
+def read(tmp_path):
+    """Read a text as a file, by stated settings."""
+
+    def table(text, name="run.csv", columns=None, **stated):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return read_table(path, FileSettings(**stated), columns)
+
+    return table
 
 
 def with_comma(text):
@@ -60,8 +66,8 @@ def with_comma(text):
         "Time [s],Heave [mm],Pitch (deg),WP 1\n0 : -0\n" + ROWS,
     ],
 )
-def test_dialects(tmp_path, text):
-    run = read_table(write(tmp_path, text))
+def test_dialects(read, text):
+    run = read(text)
     assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
     assert run["Heave"].dims == ("time",)
     values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
@@ -71,9 +77,9 @@ def test_dialects(tmp_path, text):
     assert units == ["mm", "deg", "-" if ",-\n" in text or "\t-\n" in text else None]
 
 
-def test_blanks(tmp_path):
+def test_blanks(read):
     text = "  Time [s]   Heave [mm]  Pitch\n  0.0   1.5  -2\n 0.1  1  2\n"
-    run = read_table(write(tmp_path, text, "run.txt"))
+    run = read(text, "run.txt")
     assert list(run.data_vars) == ["Heave", "Pitch"]
     assert run["Heave"].attrs["units"] == "mm"
     assert_array_equal(run["Pitch"], [-2, 2])
@@ -81,18 +87,18 @@ def test_blanks(tmp_path):
 
 @pytest.mark.parametrize("words", [" of four words here\n\n", "\n three words here\n"])
 @pytest.mark.parametrize("mark", [" ", "\t"])
-def test_words_stand_above_the_header(tmp_path, mark, words):
+def test_words_stand_above_the_header(read, mark, words):
     table = "Time Heave Pitch WP\n(s) (mm) (kN-m) (-)\n0 1.5 -2 3\n0.1 1 2 4\n"
     text = f"Made by a program, on a day: no 7\n{words}{table.replace(' ', mark)}"
-    run = read_table(write(tmp_path, text, "run.out"))
+    run = read(text, "run.out")
     units = {str(name): each.attrs.get("units") for name, each in run.items()}
     assert units == {"Heave": "mm", "Pitch": "kN-m", "WP": "-"}
     assert_array_equal(run["Pitch"], [-2, 2])
 
 
-def test_words_stand_above_a_header_that_holds_another_mark(tmp_path):
+def test_words_stand_above_a_header_that_holds_another_mark(read):
     text = "Made by a program\n\nTime Heave WP,1\n0 1.5 3\n0.1 1 4\n"
-    run = read_table(write(tmp_path, text), FileSettings(delimiter=" "))
+    run = read(text, delimiter=" ")
     assert list(run.data_vars) == ["Heave", "WP,1"]
 
 
@@ -101,101 +107,97 @@ def test_words_stand_above_a_header_that_holds_another_mark(tmp_path):
 @pytest.mark.parametrize("bad", ["0.00,OVR,1.0", "nan,OVR,nan", "(sec),(mtr),(mtr)"])
 def test_a_header_stands_apart_from_a_row_that_is_no_header(tmp_path, units, apart, bad):
     text = f"time,WP fwd,heave\n{units}{apart}{bad}\n0.05,0.1,1.1\n0.10,0.2,1.2\n"
-    columns = read_columns(write(tmp_path, text), FileSettings())
+    path = tmp_path / "run.csv"
+    path.write_text(text)
+    columns = read_columns(path)
     assert list(columns.headers) == ["time", "WP fwd", "heave"]
     line = 4 if units else 3
     assert f"line {line}, column 'WP fwd'" in columns.faults["WP fwd"]
 
 
-def test_options(tmp_path):
+def test_options(read):
     text = "made by a logger\nRecord 7\n! remark\nclock|heave\n".replace("|", ";") + "0;1\n50;2\n"
-    options = FileSettings(skip_rows=2, comment="!", time="clock", time_unit="ms", delimiter=";")
-    run = read_table(write(tmp_path, text), options)
+    stated = {"skip_rows": 2, "comment": "!"}
+    run = read(text, **stated, time="clock", time_unit="ms", delimiter=";")
     assert_allclose(run["time"], [0, 0.05], rtol=1e-15)
     message = (
         r"has no column with a usual name of times\. State time = 'NAME' or sampling_rate "
         r"\(Hz\) in \[files\]\. Its columns: clock, heave"
     )
-    with pytest.raises(RequestError, match=message):
-        read_table(tmp_path / "run.csv", FileSettings(skip_rows=2, comment="!"))
+    with request_error(message):
+        read(text, **stated)
 
 
 @pytest.mark.parametrize("name", ["time_ms", "Tid_ms", "t ms"])
 @pytest.mark.parametrize("stated", [None, "stated"])
-def test_time_in_the_unit_that_its_name_ends_on(tmp_path, name, stated):
-    path = write(tmp_path, f"{name};heave\n0;1\n20;2\n")
-    run = read_table(path, FileSettings(time=stated and name))
+def test_time_in_the_unit_that_its_name_ends_on(read, name, stated):
+    text = f"{name};heave\n0;1\n20;2\n"
+    run = read(text, time=stated and name)
     assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
-    slow = read_table(path, FileSettings(time=name, time_unit="s"))  # a name is no header
+    slow = read(text, time=name, time_unit="s")  # a name is no header
     assert_array_equal(slow["time"], [0, 20])
 
 
-def test_a_unit_of_time_stated_against_the_header(tmp_path):
-    path = write(tmp_path, "Zeit [s],heave\n0,1\n0.02,2\n")
+def test_a_unit_of_time_stated_against_the_header(read):
+    text = "Zeit [s],heave\n0,1\n0.02,2\n"
     for unit in ("s", "sec"):
-        assert read_table(path, FileSettings(time_unit=unit))["time"][1] == 0.02
-    with pytest.raises(
-        RequestError,
-        match=r"time_unit: 'ms' is stated, and .*run\.csv says 's' for its time column 'Zeit'\. "
-        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header",
+        assert read(text, time_unit=unit)["time"][1] == 0.02
+    with request_error(
+        r"time_unit: 'ms' is stated, and .*run\.csv says 's' for its time column 'Zeit'\. "
+        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header"
     ):
-        read_table(path, FileSettings(time="Zeit", time_unit="ms"))
-    with pytest.raises(RequestError, match="the unit 'm' does not fit the time column 't'"):
-        read_table(write(tmp_path, "t [m],heave\n0,1\n1,2\n"))
-    rated = read_table(path, FileSettings(sampling_rate=10))  # what the message proposes
+        read(text, time="Zeit", time_unit="ms")
+    with request_error("the unit 'm' does not fit the time column 't'"):
+        read("t [m],heave\n0,1\n1,2\n")
+    rated = read(text, sampling_rate=10)  # what the message proposes
     assert_array_equal(rated["time"], [0, 0.1])
 
 
-def test_latin_1_is_read_and_said(tmp_path):
-    path = write(tmp_path, "tid [s],bølge [°]\n0,1\n1,2\n", encoding="latin-1")
-    with pytest.warns(
-        SeakeepWarning, match=r"is not UTF-8 and was read as Windows-1252 \(Latin-1\); check"
-    ):
-        run = read_table(path)
+def test_latin_1_is_read_and_said(read):
+    text = "tid [s],bølge [°]\n0,1\n1,2\n".encode("latin-1")
+    with warned(r"is not UTF-8 and was read as Windows-1252 \(Latin-1\); check"):
+        run = read(text)
     assert run["bølge"].attrs["units"] == "°"
-    assert read_table(path, FileSettings(encoding="latin-1")).identical(run)
+    assert read(text, encoding="latin-1").identical(run)
 
 
 @pytest.mark.parametrize("row", ["s,mm,deg", "s,-,deg", "s,cm,rad"])
-def test_a_header_and_a_row_that_state_other_units_are_refused(tmp_path, row):
+def test_a_header_and_a_row_that_state_other_units_are_refused(read, row):
     unit, said = ("cm", row.split(",")[1]) if row.endswith("deg") else ("deg", "rad")
     name = {"cm": "HEAVE_MRU", "deg": "Pitch"}[unit]
-    path = write(tmp_path, f"Time [s],HEAVE_MRU [cm],Pitch (deg)\n{row}\n0,1,2\n1,2,3\n")
-    with pytest.raises(
-        DataError,
-        match=rf"the header says '{unit}' for the column '{name}', and the row of units below it "
-        rf"'{said}'\. Correct the wrong one of them",
+    text = f"Time [s],HEAVE_MRU [cm],Pitch (deg)\n{row}\n0,1,2\n1,2,3\n"
+    with data_error(
+        rf"the header says '{unit}' for the column '{name}', and the row of units below it "
+        rf"'{said}'\. Correct the wrong one of them"
     ):
-        read_table(path)
+        read(text)
 
 
-def test_a_header_and_a_row_that_spell_one_unit_in_two_ways(tmp_path):
-    path = write(tmp_path, "Time [s],acc [m/s2],h [MRU]\nsec,m/s^2,mm\n0,1,2\n1,2,3\n")
-    units = {str(name): each.attrs["units"] for name, each in read_table(path).items()}
+def test_a_header_and_a_row_that_spell_one_unit_in_two_ways(read):
+    run = read("Time [s],acc [m/s2],h [MRU]\nsec,m/s^2,mm\n0,1,2\n1,2,3\n")
+    units = {str(name): each.attrs["units"] for name, each in run.items()}
     assert units == {"acc": "m/s^2", "h": "mm"}
 
 
-def test_commas_that_may_divide_thousands_are_refused(tmp_path):
-    path = write(tmp_path, "t;h\n0;999\n1;1,234\n2;12,345\n")
-    with pytest.raises(
-        DataError, match=r"comma of '1,234' may divide thousands or decimals.* state decimal = ','"
-    ):
-        read_table(path)
-    run = read_table(path, FileSettings(decimal=","))  # what the message proposes
+def test_commas_that_may_divide_thousands_are_refused(read):
+    text = "t;h\n0;999\n1;1,234\n2;12,345\n"
+    with data_error(r"comma of '1,234' may divide thousands or decimals.* state decimal = ','"):
+        read(text)
+    run = read(text, decimal=",")  # what the message proposes
     assert_array_equal(run["h"], [999, 1.234, 12.345])
     for cell in ("0,512", ",512", "1,5", "1234,567", "1,2345", "-0,500"):  # decimals for certain
-        run = read_table(write(tmp_path, f"t;h\n0;1,234\n1;{cell}\n"))
+        run = read(f"t;h\n0;1,234\n1;{cell}\n")
         assert_array_equal(run["h"], [1.234, float(cell.replace(",", "."))])
 
 
-def test_missing_values_are_nan(tmp_path):
-    run = read_table(write(tmp_path, "t,a,b\n0,,nan\n1,NaN,1\n2,3,\n"))
+def test_missing_values_are_nan(read):
+    run = read("t,a,b\n0,,nan\n1,NaN,1\n2,3,\n")
     assert_array_equal(run["a"], [np.nan, np.nan, 3])
     assert_array_equal(run["b"], [np.nan, 1, np.nan])
 
 
-def test_a_column_by_its_full_header(tmp_path):
-    run = read_table(write(tmp_path, "t,WP [m],WP [mm]\n0,1,2\n1,1,2\n"), columns=["WP [mm]"])
+def test_a_column_by_its_full_header(read):
+    run = read("t,WP [m],WP [mm]\n0,1,2\n1,1,2\n", columns=["WP [mm]"])
     assert list(run.data_vars) == ["WP [mm]"]
     assert run["WP [mm]"].attrs == {"long_name": "WP [mm]", "units": "mm"}
 
@@ -210,7 +212,7 @@ def test_a_column_by_its_full_header(tmp_path):
     bracketed=st.booleans(),
     compressed=st.booleans(),
 )
-def test_round_trip(tmp_path, values, delimiter, comma, bracketed, compressed):
+def test_round_trip(read, values, delimiter, comma, bracketed, compressed):
     """Whatever the dialect, the same bits come back."""
     names, units = ["time", "heave", "a_b", "c"], ["s", "mm", "m/s2", "-"]
     both = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
@@ -219,7 +221,7 @@ def test_round_trip(tmp_path, values, delimiter, comma, bracketed, compressed):
     for i, row in enumerate(values):
         lines.append([repr(float(x)).replace(".", point) for x in (i, *row)])
     raw = "".join(delimiter.join(line) + "\n" for line in lines).encode()
-    run = read_table(write(tmp_path, gzip.compress(raw, mtime=0) if compressed else raw))
+    run = read(gzip.compress(raw, mtime=0) if compressed else raw)
     assert_array_equal(np.column_stack([each for _, each in run.items()]), values)
     assert [each.attrs["units"] for _, each in run.items()] == units[1:]
 
@@ -273,7 +275,6 @@ NO_TABLE = {
 
 
 @pytest.mark.parametrize(("text", "message"), NO_TABLE.items())
-def test_what_is_no_table(tmp_path, text, message):
-    path = write(tmp_path, text)
-    with pytest.raises(DataError, match=message):
-        read_table(path)
+def test_what_is_no_table(read, text, message):
+    with data_error(message):
+        read(text)

@@ -1,6 +1,7 @@
 """Irregular seas whose components are known."""
 
 from dataclasses import dataclass
+from math import tau
 
 import numpy as np
 
@@ -18,7 +19,7 @@ class Sea:
 
     def at(self, time, place=0.0):
         """Elevation at a place, fixed or moving, m downstream."""
-        omega = 2 * np.pi * self.frequency
+        omega = tau * self.frequency
         turn = np.outer(time, omega) - np.outer(place + 0 * time, wavenumber(omega, self.depth))
         return np.cos(turn + self.phase) @ self.amplitude
 
@@ -33,4 +34,4 @@ def sea(seed=0, band=(0.28, 1.13), peak=2.05, components=100, jitter=1.0):
     f = edges[:-1] + np.diff(edges) * (0.5 + jitter * rng.uniform(-0.5, 0.5, components))
     amplitude = np.sqrt(f**-5 * np.exp(-1.25 * (peak * f) ** -4))
     amplitude /= np.sqrt(0.5 * np.sum(amplitude**2))
-    return Sea(f, amplitude, rng.uniform(0, 2 * np.pi, components))
+    return Sea(f, amplitude, rng.uniform(0, tau, components))

@@ -1,7 +1,7 @@
 """Stand-in of rclpy: nodes under an executor whose clock is that of a bag, with real messages."""
 
 import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 from bags import STORE, message
 from rosbags.rosbag2 import Reader
@@ -96,6 +96,4 @@ def install(monkeypatch):
         },
     }
     for name, content in modules.items():
-        module = ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
+        monkeypatch.setitem(sys.modules, name, SimpleNamespace(**content))

@@ -4,8 +4,8 @@ from zipfile import ZipFile
 
 import pytest
 from drifting import INPUTS, STATES, drifting_run
+from ensembles import few
 
-import seakeep
 from seakeep import HankelDMDc, ProbeAlignment, RequestError
 from seakeep.hosts import write_estimator
 from seakeep.hosts.program import exportable, timing
@@ -58,26 +58,22 @@ def test_an_estimator_knows_the_noise_and_the_roles_of_the_command(make_run, run
 
 
 def test_an_ensemble_is_no_estimator_nor_is_a_member(make_run, run):
-    ensemble = seakeep.BayesianHankelDMDc(
-        window=None, state_delays=2, input_delays=4, ridge=seakeep.Uniform(1, 2), n_members=2
-    ).fit(make_run(), ["heave"], ["eta_fwd"])
+    ensemble = few().fit(make_run(), ["heave"], ["eta_fwd"])
     for more in ("", " --member 0"):
         said = run(ensemble, f"--c . --estimator{more}", 2)
         assert "Fit a single model of the same runs" in said
 
 
-def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(make_run, channels):
-    alignment = ProbeAlignment(surge="none", celerity=2.0, offset=0.5)
-    model = HankelDMDc(2, 2, 1.0, alignment=alignment).fit(make_run(), **channels)
-    with pytest.raises(RequestError, match=r"carried over whole records, .* surge = 'predicted'"):
-        exportable(model)
-    measured = ProbeAlignment(mode="dispersion", surge="measured")
-    model = HankelDMDc(2, 2, 1.0, alignment=measured).fit(drifting_run(), STATES, INPUTS)
-    with pytest.raises(RequestError, match="to the measured surge, which no step can make"):
-        exportable(model)
-    followed = ProbeAlignment(mode="dispersion", surge="predicted")
-    spec = HankelDMDc(2, 2, 1.0, delay_rows="exact", alignment=followed)
-    model = spec.fit(drifting_run(), STATES, INPUTS)
+def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(cases):
+    for words, alignment in {
+        "carried over whole records, .* surge = 'predicted'": {"surge": "none", "celerity": 2.0},
+        "to the measured surge, which no step can make": {"surge": "measured"},
+    }.items():
+        spec = HankelDMDc(2, 2, 1.0, alignment=ProbeAlignment(offset=0.5, **alignment))
+        model = spec.fit(drifting_run(), STATES, INPUTS)
+        with pytest.raises(RequestError, match=words):
+            exportable(model)
+    model = cases["following"].model
     assert "the probes as measured, where they stood in training" in timing(exportable(model))
     with pytest.raises(RequestError, match="its own surge takes it, which no linear system"):
         model.to_state_space()

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from records import table
 
 from seakeep import HankelDMDc, RequestError
 from seakeep.hosts import write_fmu
@@ -114,6 +115,16 @@ def test_another_process_goes_on_from_a_state_to_the_last_bit(slave, unpacked, c
     assert_array_equal(found, expected)
 
 
+def test_a_step_that_does_not_follow_on_the_last_is_refused(slave, cases):
+    case = cases["full"]
+    run(slave, case, 0, 3)
+    for start, step in ((2, 1.0), (4, 1.0), (3, 1.001)):
+        with pytest.raises(Exception, match="fmi2DoStep failed with status 3"):
+            slave.doStep(start * case.model.dt, step * case.model.dt)
+    found = run(slave, case, 3, len(case.expected))
+    assert_allclose(found, case.expected[3:], rtol=1e-12, atol=1e-12)
+
+
 def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
     case = cases["full"]
     _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])
@@ -169,6 +180,5 @@ def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samp
     assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)
     monkeypatch.setattr(type(live), "conditions", None)  # C does not widen outside the training
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, 1)))
-    ahead = live.forecast(3)
-    expected = [ahead[x].values[row, n] for row in (0, 1) for n in range(3) for x in model.states]
+    expected = table(live.forecast(3), model.states)[:2].ravel()
     assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)

@@ -18,11 +18,8 @@ from seakeep.models.inputs import Scale
 from seakeep.signals.prediction import foresee
 
 START, STEPS, LEAD = 20.0, 40, 6
-
-
-def model_of(drifts, **settings):
-    spec = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, **settings)
-    return spec.fit(drifts, STATES, INPUTS)
+SPEC = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD)
+OWN_MEANS = replace(SPEC, centre="run")
 
 
 @pytest.fixture(scope="module", params=["plain", "aligned", "observed"])
@@ -32,7 +29,7 @@ def model(request, drifts):
         "aligned": {"alignment": FOLLOWED},
         "observed": {"alignment": FOLLOWED, "observables": (SQUARES,)},
     }
-    return model_of(drifts, **settings[request.param])
+    return replace(SPEC, **settings[request.param]).fit(drifts, STATES, INPUTS)
 
 
 def up_to(run, last):
@@ -55,14 +52,15 @@ def reads_until(model, run):
 
 
 def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
-    last = reads_until(model, drift) - 10
+    end = reads_until(model, drift)
+    last = end - 10
     short = up_to(drift, last)
     with pytest.raises(RequestError, match="ahead = 'predict' continues the input"):
         model.forecast(short, START, STEPS)
     found = model.forecast(short, START, STEPS, ahead="predict")
     assert found.sizes["time"] == STEPS
     # By hand: the probes continued, everything after the start but waves thrown away.
-    long = up_to(drift, last + 10).copy(deep=True)
+    long = up_to(drift, end).copy(deep=True)
     waves = foresee(
         table(short, INPUTS),
         10,
@@ -79,15 +77,15 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     # What is missing counts as not there, and what lies beyond it is not read.
     gone = drift.copy(deep=True)
     for name in INPUTS:
-        gone[name].values[last + 1 : reads_until(model, drift) + 1] = np.nan
-        gone[name].values[reads_until(model, drift) + 1 :] = 1e9
+        gone[name].values[last + 1 :] = np.nan
+        gone[name].values[end + 1 :] = 1e9
     again = model.forecast(gone, START, STEPS, ahead="predict")
     assert_array_equal(table(again, STATES), table(found, STATES))
     assert again.attrs["status"] == found.attrs["status"]
 
 
 def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift):
-    model = model_of(drifts)
+    model = SPEC.fit(drifts, STATES, INPUTS)
     last = reads_until(model, drift) - 10
     short = up_to(drift, last)
     found = model.forecast(short, START, STEPS, ahead="predict")
@@ -132,14 +130,11 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     assert np.all(np.ptp(every[:, -1], axis=0) > 0)  # a band stays where waves are predicted
 
 
-OWN_MEANS = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, centre="run")
-
-
 @pytest.mark.parametrize(
     ("spec", "positions"),
     [
-        (HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD), True),
-        (HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD), False),
+        (SPEC, True),
+        (SPEC, False),
         (Subspace(4, 12, 1e-3, order=6, lead=LEAD), True),
         (OWN_MEANS, True),
         (replace(OWN_MEANS, alignment=FOLLOWED), True),
@@ -180,21 +175,22 @@ def weigh(parts, claimed, predicted, histories=((0.0,),)):
     weigh_members(windows, parts, errors, Scale(zero, one, one, zero, one))
 
 
-@pytest.mark.parametrize("lost", [None, 0, 1])
+@pytest.mark.parametrize("lost", [0, 1])
 def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
-    parts = np.full((3, 2, 1, 9, 1), 5.0)  # of two members, the last one's departure
-    parts[:, 0] = -3.0
-    if lost is None:  # a member whose departure is lost counts with the others
-        parts[1, 0, :, -1] = np.nan
-        weigh(parts, 9.0, 3)
-        assert_allclose(parts[0, :, 0, :, 0].mean(axis=0), [1.0] * 3 + [0.0] * 6)
-        assert_allclose(np.ptp(parts[0], axis=0), 8.0)
-        return
-    parts = parts[:, :1]
-    parts[lost, :, :, -1] = np.nan
+    parts = np.full((3, 1, 1, 9, 1), -3.0)
+    parts[lost, ..., -1, :] = np.nan
     weigh(parts, 9.0, 3)
     expected = [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan]
     assert_allclose(parts[0, 0, 0, :, 0], expected)
+
+
+def test_a_member_whose_departure_is_lost_counts_with_the_others():
+    parts = np.full((3, 2, 1, 9, 1), 5.0)
+    parts[:, 0] = -3.0
+    parts[1, 0, :, -1] = np.nan
+    weigh(parts, 9.0, 3)
+    assert_allclose(parts[0, :, 0, :, 0].mean(axis=0), [1.0] * 3 + [0.0] * 6)
+    assert_allclose(np.ptp(parts[0], axis=0), 8.0)
 
 
 def test_a_sea_that_departs_from_training_is_forecast_on():
@@ -228,7 +224,7 @@ def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
 
 
 def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):
-    model, at, steps = model_of(drifts), 400, 250
+    model, at, steps = SPEC.fit(drifts, STATES, INPUTS), 400, 250
     # Waves are known for longer than a forecast without them is trusted.
     start, last = float(drift.time[at]), at + 100
     short = unplaced(up_to(drift, last))

@@ -1,16 +1,13 @@
 """Alignment of the wave input in fit and forecast: a vessel that drifts, probes that are moved."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import xarray as xr
 from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run, heave_error
-from ensembles import few
 from numpy.testing import assert_array_equal
 from records import table
 
-from seakeep import DataError, HankelDMDc, ProbeAlignment, Uniform, estimate_probe_offset
+from seakeep import DataError, HankelDMDc, ProbeAlignment, estimate_probe_offset
 from seakeep.models.labelled import Span
 
 
@@ -76,14 +73,6 @@ def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(drifts)
         assert attrs["alignment_celerity"] == pytest.approx(expected)
     xr.testing.assert_allclose(model.aligned_inputs(slow), stated.aligned_inputs(slow))
     assert model.alignment.celerity_of(drifting_run(8)) == pytest.approx(mean)
-
-
-def test_an_ensemble_and_a_single_model_take_the_celerity_from_the_same_span(drifts):
-    alignment = ProbeAlignment(mode="effective")
-    cut = [run.sel(time=slice(0, 100)) for run in drifts]
-    alone = replace(spec(alignment), window=300).fit(drifts, STATES, INPUTS, stop=100.0)
-    ensemble = few(window=Uniform("18 T", "30 T"), alignment=alignment).fit(cut, STATES, INPUTS)
-    assert ensemble.alignment.celerity == alone.alignment.celerity
 
 
 def test_a_probe_that_was_moved_and_says_so_changes_nothing(models):

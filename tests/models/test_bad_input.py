@@ -43,14 +43,6 @@ def test_gaps_in_the_window_are_refused(run, channels, name, value):
         SPEC.fit(run, **channels)
 
 
-def test_gaps_outside_of_the_window_are_no_matter(run, channels):
-    spec = HankelDMDc(3, 8, 1.0, window=100)
-    expected = spec.fit(run, stop=10.0, **channels)
-    run.heave[:50] = np.nan
-    run.eta_cog[300:] = np.nan
-    np.testing.assert_array_equal(spec.fit(run, stop=10.0, **channels).A, expected.A)
-
-
 def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
     run.heave[98] = np.nan
     with pytest.raises(DataError, match=r"'heave' .* 1 missing .* the first at t = 4\.9 s"):

@@ -45,7 +45,8 @@ def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
     windows = model.read_windows(run, [60.0, 80.0], 50)
     assert windows.delayed.shape == (2, 40 + 50, 6)
     found = envelope_of(model.signature, windows)
-    still = run.assign(surge=("time", np.full(run.sizes["time"], 0.0), run["surge"].attrs))
+    still = run.copy(deep=True)
+    still["surge"].values[:] = 0.0
     other = envelope_of(model.signature, model.read_windows(still, [60.0], 50))
     assert found.shape == (2, 50)
     assert np.all((found > 0.2) & (found < 3))  # SD of the waves of training
@@ -91,30 +92,25 @@ def test_a_step_is_the_equation():
         return recursion(models, place, *given)
 
     found, used = run(slice(3), slice(2), forcing)
-    for model in range(3):
-        for window in range(2):
-            x, u = list(histories[model, window]), list(delayed[window])
-            for step in range(steps):
-                surge = [offset[model] + gain[model] * each[1] for each in x[-P:]]
-                here = min(max(np.mean(surge), -1.0), 1.0)
-                row = [
-                    np.interp(here, place.grid, table[starts[window] + step, :, column])
-                    for column in range(n)
-                ]
-                u.append(np.array(row))
-                following = (
-                    a[model] @ np.concatenate(x[: -s - 2 : -1])
-                    + b[model] @ np.concatenate(u[: -z - 2 : -1])
-                    + d[model, :, 0] * (here - 0.1) ** 2
-                    + forcing[model, window, step]
-                )
-                x.append(following)
-            # One window of one model runs by numbers, not by arrays.
-            alone = run(slice(model, model + 1), slice(window, window + 1), forcing)
-            one = [each[0, 0] for each in alone]
-            for states, inputs in ((found[model, window], used[model, window]), one):
-                assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
-                assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
+    for model, window in np.ndindex(3, 2):
+        x, u = list(histories[model, window]), list(delayed[window])
+        for step in range(steps):
+            surge = offset[model] + gain[model] * np.array(x[-P:])[:, 1]
+            here = np.clip(surge.mean(), -1.0, 1.0)
+            waves = table[starts[window] + step].T
+            u.append(np.array([np.interp(here, place.grid, each) for each in waves]))
+            x.append(
+                a[model] @ np.concatenate(x[: -s - 2 : -1])
+                + b[model] @ np.concatenate(u[: -z - 2 : -1])
+                + d[model, :, 0] * (here - 0.1) ** 2
+                + forcing[model, window, step]
+            )
+        # One window of one model runs by numbers, not by arrays.
+        alone = run(slice(model, model + 1), slice(window, window + 1), forcing)
+        one = [each[0, 0] for each in alone]
+        for states, inputs in ((found[model, window], used[model, window]), one):
+            assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
+            assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
     lost = np.where(np.arange(steps)[:, None] < 20, forcing, np.nan)
     for of in (slice(1), slice(3)):  # a run that is lost stays so, and keeps a place
         one, driven = run(of, slice(1), lost)

@@ -32,7 +32,7 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
     table = result.table
     kinds = {
         "fir": FIR(12, lead=3),
-        "arx": ARX(6, 12, lead=3),
+        "arx": ARX(6, 12, ridge_scale="per_snapshot", lead=3),
         "subspace": Subspace(6, 12, 0.1, lead=3),
     }
     assert set(table["kind"].values.tolist()) == {"hankel_dmdc", *kinds}
@@ -40,8 +40,6 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
     for kind, spec in kinds.items():
         row = table.isel(trial=np.flatnonzero(table["kind"].values == kind)[-1])
         own = replace(spec, ridge=float(row["ridge"]))
-        if kind == "arx":
-            own = replace(own, ridge_scale="per_snapshot")
         found = []
         for name, run in given.items():
             model = own.fit([r for n, r in given.items() if n != name], STATES, INPUTS)
@@ -53,7 +51,7 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
     drawn = [each.get_text().split(",")[0] for each in legend[:-1]]
     assert set(drawn) == {f"kind {kind}" for kind in ("hankel_dmdc", *kinds)}
     # A vessel with a memory stays a Hankel model.
-    assert isinstance(result.spec, HankelDMDc)
+    assert isinstance(result.settings, HankelDMDc)
     assert "kind = " not in result.note
 
 
@@ -63,9 +61,9 @@ def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tun
     spec = HankelDMDc(40, 3, 1e-5, delay_rows="exact", ridge_scale="per_snapshot")
     result = tune(spec, given, ["heave"], ["eta"], vary=["kind"], horizon=(5,))
     assert "kind = 'fir' errs 0." in result.note
-    assert isinstance(result.spec, FIR)
-    assert result.spec.input_delays == 3
-    model = result.spec.fit(given, ["heave"], ["eta"])
+    assert isinstance(result.settings, FIR)
+    assert result.settings.input_delays == 3
+    model = result.settings.fit(given, ["heave"], ["eta"])
     taps = model.B[0] * model.state_std / model.input_std
     # Of 4 runs of 200 samples in noise of SD 1: to 0.035 each.
     np.testing.assert_allclose(taps, [1.0, -0.5, 0.3, 0.0], rtol=0, atol=0.12)

@@ -55,4 +55,4 @@ def test_a_memory_is_recommended_where_the_vessel_has_one():
         replace(spec, select=None), given, ["heave"], ["eta"], vary=["memory"], horizon=[20.0]
     )
     # Of the same windows, and without a period of its own.
-    assert tuned.spec.memory == round(8 * 0.2 / 0.1)
+    assert tuned.settings.memory == round(8 * 0.2 / 0.1)

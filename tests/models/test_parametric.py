@@ -69,25 +69,11 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     assert "parameter     rig.draught, trained from 0 to 1" in again.summary()
     # Its errors are those at each value, and of the file too.
     assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
-    served = [each.at(parameter=0.7).live().errors for each in (model, again)]
+    served = [each.at(parameter=0.7).live(like=run).errors for each in (model, again)]
     assert_array_equal(served[0].rms, served[1].rms)
     x, u = table(run, ["heave"]), table(run, ["eta"])
     arrays = at.forecast_arrays(x[:51], u[:51], u[51:251], 200)
     assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
-
-
-def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
-    spec = replace(SPEC, ridge=1.0, standardize=True)
-    model = spec.fit(vessels((0.0, 1.0), 40, 800, 0.5), *CHANNELS)
-    again = load_model(model.save(tmp_path / "model.nc"))
-    run = vessel(0.4, 3).isel(time=slice(0, 60))
-    forecast = model.forecast(run, start=5.9, steps=50, ahead="predict")
-    xr.testing.assert_identical(again.forecast(run, start=5.9, steps=50, ahead="predict"), forecast)
-    live = again.at(parameter=0.4).live(like=run)
-    for eta, heave in zip(run.eta.values, run.heave.values, strict=True):
-        live.step([eta], [heave])
-    served = live.forecast(50).heave.sel(statistic="mean")
-    assert_allclose(served, forecast.heave, rtol=0, atol=1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):
@@ -102,14 +88,11 @@ def test_windows_of_several_runs_take_the_value_of_each(model):
 
 
 def test_means_follow_the_parameter():
-    def shifted(draught, seed):
-        run = vessel(draught, seed, 4000, noise=0.01)
-        return run.assign(heave=run.heave + 3.0 * draught).assign_attrs(run.attrs)
-
     spec = replace(SPEC, state_delays=6, ridge=1e-4, ridge_scale="per_snapshot", standardize=True)
-    runs = [shifted(p, 20 + n) for n, p in enumerate((0.0, 0.5, 1.0))]
-    model = spec.fit([run.assign_coords(time=run.time) for run in runs], *CHANNELS)
-    mean = model.at(parameter=0.75).state_mean[0]
+    runs = vessels((0.0, 0.5, 1.0), 20, 4000, 0.01)
+    for run in runs:
+        run["heave"].values[:] += 3.0 * run.attrs["rig"]["draught"]
+    mean = spec.fit(runs, *CHANNELS).at(parameter=0.75).state_mean[0]
     # The mean of 4,000 samples of a heave of SD 2 to 6 is known to about a tenth.
     assert mean == pytest.approx(2.25, abs=0.3)
 
@@ -127,15 +110,15 @@ def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
     same = CHOSEN.fit(alike, *CHANNELS)
     assert same.settings.parameter == ""
     assert "a pooled one" in same.selection
-    assert tune(CHOSEN, alike, *CHANNELS).spec.parameter == ""
+    assert tune(CHOSEN, alike, *CHANNELS).settings.parameter == ""
 
 
 def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started(family):
     start = replace(CHOSEN, ridge=1e-6)
     result = tune(start, family, *CHANNELS, vary=["state_delays"])
-    assert result.spec.parameter == "rig.draught"
+    assert result.settings.parameter == "rig.draught"
     assert result.note.startswith("on runs of inner values that are held out, a model that varies")
-    before, after = (error(spec.fit(family, *CHANNELS)) for spec in (start, result.spec))
+    before, after = (error(spec.fit(family, *CHANNELS)) for spec in (start, result.settings))
     assert after < 1.01 * before
 
 

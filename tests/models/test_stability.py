@@ -22,12 +22,6 @@ def growing(factor=1.5, samples=60, scale=1.0):
     return record(0.1, heave=scale * heave, eta_fwd=eta)
 
 
-def fit_growing(**settings):
-    run = growing(**settings)
-    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact")
-    return spec.fit(run, states=["heave"], inputs=["eta_fwd"]), run
-
-
 def test_modes_are_natural_frequency_and_damping_of_the_oscillator():
     vessel = Oscillator()
     spec = HankelDMDc(1, 1, 0.0, standardize=False)
@@ -35,10 +29,7 @@ def test_modes_are_natural_frequency_and_damping_of_the_oscillator():
     mode, natural = identified.modes().isel(mode=0), vessel.frequency / (2 * np.pi)
     damped = natural * np.sqrt(1 - vessel.ratio**2)
     decay = 1 / (vessel.frequency * vessel.ratio)
-    # As above; the logarithm adds nothing.
     assert identified.modes().sizes["mode"] == 1
-    radius = np.exp(-vessel.dt / decay)
-    assert identified.spectral_radius == pytest.approx(radius, rel=1e-9)
     expected = {
         "natural_frequency": natural,
         "damping_ratio": vessel.ratio,
@@ -50,23 +41,13 @@ def test_modes_are_natural_frequency_and_damping_of_the_oscillator():
     assert mode.natural_frequency.attrs["units"] == "Hz"
 
 
-def test_an_unstable_model_warns_and_says_what_to_do():
-    model, _ = fit_growing()
-    message = (
-        r"the spectral radius of the model is 1\.4979\d*: a free run grows by 50 % per step .* "
-        r"Raise ridge, train on more data, use fewer state delays"
-    )
-    with pytest.warns(SeakeepWarning, match=message):
-        # Sample means of 60 samples are not a fixed point of the system: an error of that kind.
-        assert model.spectral_radius == pytest.approx(1.5, rel=1e-2)
-    assert "UNSTABLE" in model.summary()
-
-
 @pytest.mark.parametrize(("factor", "scale"), [(1.5, 1.0), (1e4, 1.0), (1e200, 1.0), (10.0, 1e8)])
 def test_a_forecast_that_diverges_ends_in_nan_with_its_status(factor, scale):
     # The growth of the model is set by hand: what is tested is the end of the run, whatever the
     # speed it comes at and the unit it comes in. Warnings are errors in this suite.
-    model, run = fit_growing(scale=scale)
+    run = growing(scale=scale)
+    spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact")
+    model = spec.fit(run, ["heave"], ["eta_fwd"])
     object.__setattr__(model, "coefficients", np.array([[factor, 0.0]]))
     long = run.pad(time=(0, 1000), mode="wrap").assign_coords(time=0.1 * np.arange(1060))
     forecast = model.forecast(long, start=1.0)
@@ -92,24 +73,19 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(factor, scale):
 def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stable, radius, rows):
     run = growing()
     spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
-    with pytest.warns(SeakeepWarning, match=r"or set stable = True\."):
-        grows = spec.fit(run, ["heave"], ["eta_fwd"]).eigenvalues
+    unclipped = spec.fit(run, ["heave"], ["eta_fwd"])
+    words = r"is 1\.\d+: a free run grows by [45]\d % per step in .* or set stable = True\."
+    with pytest.warns(SeakeepWarning, match=words):
+        grows = unclipped.eigenvalues
+    assert "UNSTABLE" in unclipped.summary()
     model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])
     found = model.eigenvalues
-    assert abs(found[0]) == pytest.approx(radius, rel=1e-9)
+    assert model.spectral_radius == pytest.approx(radius, rel=1e-9)
     assert_allclose(found[1:], grows[1:], atol=1e-9)
     assert model.training.clipped == pytest.approx([abs(grows[0])], rel=1e-9)
     told = f"1 eigenvalue clipped to {radius:g}; the largest was {abs(grows[0]):.6f}"
     assert told in model.summary()
     assert load_model(model.save(tmp_path / "m.nc")).training.clipped == model.training.clipped
-    # The system that is exported is the one that forecasts.
-    state, system = model.initial_state(run, 1.0), model.to_state_space()
-    after = system.A @ state + system.B @ (run.eta_fwd.values[[10]] - model.input_mean)
-    step = model.forecast(run, start=1.0, steps=1)
-    expected = step.heave.values - model.state_mean
-    assert_allclose(system.C @ after, expected, rtol=1e-9)
-    x, u = run.heave.values[:11, None], run.eta_fwd.values[:11, None]
-    assert_array_equal(model.initial_state_arrays(x, u), state)
 
 
 def test_a_stable_model_is_the_same_to_the_last_bit(run, channels):

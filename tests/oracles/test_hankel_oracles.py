@@ -11,8 +11,6 @@ from seakeep import HankelDMDc
 pytestmark = pytest.mark.oracle
 
 STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_cog"]
-N, Q = 2, 2
-DELAYS = [(4, 7), (6, 3), (3, 3), (0, 0)]
 # Gram matrices of these runs at λ = 0.5 have condition numbers near 1e4: rounding leaves 1e-12.
 SAME_MATRICES = 1e-10
 # Hundreds of steps of a free run add their rounding up.
@@ -24,46 +22,25 @@ def fit(runs, s, z, ridge=0.5, **settings):
     return HankelDMDc(s, z, ridge, **settings).fit(runs, states=STATES, inputs=INPUTS)
 
 
-def koopman_pipeline(runs, s, z):
+@pytest.mark.parametrize(("delay_rows", "relift"), [("ridge", False), ("exact", True)])
+@pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3)])
+def test_matrices_and_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
+    """Of the newest 150 samples of two runs, history inside."""
     pykoop = pytest.importorskip("pykoop")
+    runs, other = [make_run(samples=200), make_run(samples=180, seed=1)], make_run(160, seed=2)
+    model = fit(runs, s, z, delay_rows=delay_rows, window=150)
     pipeline = pykoop.KoopmanPipeline(
         lifting_functions=[("delay", pykoop.DelayLiftingFn(n_delays_state=s, n_delays_input=z))],
         regressor=pykoop.Edmd(alpha=0.5),
     )
     data = pykoop.combine_episodes(
-        [(number, table(run, STATES + INPUTS)) for number, run in enumerate(runs)],
+        [(number, table(run, STATES + INPUTS)[-150:]) for number, run in enumerate(runs)],
         episode_feature=True,
     )
-    pipeline.fit(data, n_inputs=Q, episode_feature=True)
-    return pipeline
-
-
-def assert_equals_pykoop(model, runs, s, z):
-    coefficients = koopman_pipeline(runs, s, z).regressor_.coef_.T
-    found = np.hstack([model.A, model.B])
-    assert_allclose(found, coefficients, rtol=0, atol=SAME_MATRICES)
-
-
-@pytest.mark.parametrize(("s", "z"), DELAYS)
-@pytest.mark.parametrize("count", [1, 2])
-def test_matrices_equal_pykoop(make_run, s, z, count):
-    runs = [make_run(samples=200 + 30 * seed, seed=seed) for seed in range(count)]
-    assert_equals_pykoop(fit(runs, s, z), runs, s, z)
-
-
-def test_a_window_with_history_inside_equals_pykoop_on_these_samples_alone(make_run):
-    run = make_run(samples=300)
-    samples = run.isel(time=slice(180, 300))
-    assert_equals_pykoop(fit(run, 4, 7, window=120), [samples], 4, 7)
-
-
-@pytest.mark.parametrize(("delay_rows", "relift"), [("ridge", False), ("exact", True)])
-@pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3)])
-def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
-    runs = [make_run(samples=200), make_run(samples=180, seed=1)]
-    other = make_run(samples=160, seed=2)
-    model = fit(runs, s, z, delay_rows=delay_rows)
-    pipeline = koopman_pipeline(runs, s, z)
+    pipeline.fit(data, n_inputs=len(INPUTS), episode_feature=True)
+    if not relift:
+        found = np.hstack([model.A, model.B])
+        assert_allclose(found, pipeline.regressor_.coef_.T, rtol=0, atol=SAME_MATRICES)
     first = model.history_samples
     expected = pipeline.predict_trajectory(
         table(other, STATES)[:first],
@@ -81,19 +58,17 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, d
     run = make_run(samples=300)
     # Ridge enough for a stable model: an unstable one would compare rounding of large numbers.
     model = fit(run, s, z, ridge=2.0, delay_rows=delay_rows, standardize=True)
-    assert model.spectral_radius < 1
     start, steps = 100, 150
-    instant = float(run.time[start])
-    deviations = table(run, INPUTS)[start : start + steps + 1] - model.input_mean
+    x, u = table(run, STATES), table(run, INPUTS)
+    state = model.initial_state_arrays(x[: start + 1], u[: start + 1])
     system = model.to_state_space()
-    assert isinstance(system, signal.StateSpace)
     assert system.dt == model.dt
-    assert not np.any(system.D)
-    assert system.A.shape == (N * (s + 1) + Q * z,) * 2
-    _, output, _ = signal.dlsim(system, deviations, x0=model.initial_state(run, start=instant))
-    physical, forecast = output + model.state_mean, model.forecast(run, start=instant, steps=steps)
+    assert len(system.A) == 2 * (s + 1) + 2 * z
+    deviations = u[start : start + steps + 1] - model.input_mean
+    physical = signal.dlsim(system, deviations, x0=state)[1] + model.state_mean
+    forecast = model.forecast(run, start=float(run.time[start]), steps=steps)
     # The first output is the measured state at the start; values are of order one.
-    assert_allclose(physical[0], table(run, STATES)[start], rtol=0, atol=1e-12)
+    assert_allclose(physical[0], x[start], rtol=0, atol=1e-12)
     assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
 
 
@@ -101,25 +76,22 @@ def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     rng = np.random.default_rng(0)
     n, q, m, s, z, ridge = 11, 2, 640, 32, 160, 100.0
     x = np.cumsum(rng.standard_normal((z + m, n)), axis=0)
-    x = (x - x[z:].mean(axis=0)) / x[z:].std(axis=0, ddof=1)
     u = rng.standard_normal((z + m, q))
-    u = (u - u[z:].mean(axis=0)) / u[z:].std(axis=0, ddof=1)
-
-    # x_j … x_{m−1} and their successors, the Hankel matrices of lags below (equations of HDMDc).
-    columns = np.arange(z, z + m - 1)
-    extended_x = np.vstack([x[columns - lag].T for lag in range(s + 1)])
-    extended_u = np.vstack([u[columns - lag].T for lag in range(z + 1)])
-    successors = np.vstack([x[columns + 1 - lag].T for lag in range(s + 1)])
-    y = np.vstack([extended_x, extended_u])
-    assert y.shape == (685, 639)
-    g = successors @ y.T @ np.linalg.inv(y @ y.T + ridge * np.eye(len(y)))
-
     states, inputs = [f"x{i}" for i in range(n)], [f"u{i}" for i in range(q)]
     columns = zip(states + inputs, np.hstack([x, u]).T, strict=True)
     run = record(0.05125, **dict(columns))
-    spec = HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
-    model = spec.fit(run, states, inputs)
-    assert model.training.columns == (639,)
+
+    def extended(series, delays, first):
+        """Columns j = `first` … of deviations, m − 1 of them (equations of HDMDc)."""
+        window = series[z:]
+        deviations = (series - window.mean(axis=0)) / window.std(axis=0, ddof=1)
+        lags = range(delays + 1)
+        return np.vstack([deviations[first - lag : first - lag + m - 1].T for lag in lags])
+
+    y = np.vstack([extended(x, s, z), extended(u, z, z)])
+    assert y.shape == (685, 639)
+    g = extended(x, s, z + 1) @ y.T @ np.linalg.inv(y @ y.T + ridge * np.eye(len(y)))
+    model = HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32).fit(run, states, inputs)
     # Fewer columns than rows; with all rows regressed the primal form is still less work.
     assert model.training.method == "primal"
     # The primal inverse at this size, condition number near 1e4, is good to about 1e-12.

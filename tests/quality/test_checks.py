@@ -1,14 +1,15 @@
 """Checks report faults as data: which kind, where, how large."""
 
 import json
+from math import tau
 
 import numpy as np
 import pytest
 import xarray as xr
 from records import record
+from said import warned
 from seas import sea
 
-from seakeep.errors import SeakeepWarning
 from seakeep.quality import Finding, Record, as_json, findings_of, warn_of
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
@@ -75,10 +76,10 @@ def test_another_scale(factor, told):
 
 @pytest.mark.parametrize(("part", "told"), [(0.8, False), (1.25, True)])
 def test_either_side_of_the_limits_on_lags(part, told):
-    t = np.sin(2 * np.pi * T / PERIOD)
-    late = np.sin(2 * np.pi * (T / PERIOD - part * LATE))
+    t = np.sin(tau * T / PERIOD)
+    late = np.sin(tau * (T / PERIOD - part * LATE))
     assert bool(kinds(late, t)) is told
-    grown = np.sin(2 * np.pi * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
+    grown = np.sin(tau * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
     assert bool(kinds(grown, t)) is told
 
 
@@ -118,7 +119,7 @@ def test_what_stands_still_has_no_lag():
     ],
 )
 def test_waves_that_none_of_their_period_is(height, slower, stated, told):
-    run = record(DT * slower, eta_fwd=height / 8**0.5 * np.sin(2 * np.pi * T / PERIOD))
+    run = record(DT * slower, eta_fwd=height / 8**0.5 * np.sin(tau * T / PERIOD))
     run["eta_fwd"].attrs["units"] = "m"
     found = [*waves_of(Record("r", run, stated_period=stated))]
     assert [each.kind.name for each in found] == told
@@ -150,7 +151,7 @@ def test_a_kind_that_is_not_loaded_keeps_its_sentence():
 
 def test_warnings_of_the_channels_of_a_model_come_once():
     told = set()
-    with pytest.warns(SeakeepWarning, match=r"^first: pitch level drifts .* record\.$"):
+    with warned(r"^first: pitch level drifts .* record\.$"):
         warn_of([FOUND, FOUND], told, ["pitch"])
     warn_of([FOUND], told, ["pitch"])
     warn_of([FOUND], set(), ["heave"])

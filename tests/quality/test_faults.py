@@ -2,12 +2,23 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.random import default_rng
 from records import record
+from seas import sea
 
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality import Record
-from seakeep.quality.faults import FLAGS, find_held, find_outliers, noise_share, saturated
+from seakeep.quality.faults import (
+    FLAGS,
+    find_held,
+    find_outliers,
+    noise_share,
+    reading_step,
+    saturated,
+)
 from seakeep.quality.samples import constant, flagged, levels, noise
 
 DT = 0.04
@@ -17,14 +28,14 @@ PERIOD = 1.6
 
 def waves():
     frequency = np.linspace(0.4, 0.9, 20)
-    phase = np.random.default_rng(0).uniform(0, 6.28, 20)
+    phase = default_rng(0).uniform(0, 6.28, 20)
     return np.cos(2 * np.pi * np.outer(T, frequency) + phase).sum(axis=1)
 
 
 @pytest.fixture
 def noisy():
     x = waves()
-    return x + 0.02 * x.std() * np.random.default_rng(1).standard_normal(x.size)
+    return x + 0.02 * x.std() * default_rng(1).standard_normal(x.size)
 
 
 def recorded(x):
@@ -42,7 +53,7 @@ def faulty(x, kind, length, place):
     """A series with a fault; one that is held repeats the reading before it."""
     at = slice(start := round(place * (x.size - length)), start + length)
     x = np.round(x, 3)
-    rng = np.random.default_rng(length)
+    rng = default_rng(length)
     random = rng.uniform(40, 200, length) * (-1) ** np.arange(length)
     burst = rng.uniform(5, 15, length) * x.std() * rng.choice([-1, 1], length)
     held = x[max(start - 1, 0)]
@@ -76,7 +87,7 @@ def test_the_shortest_run_of_equal_readings_that_is_held(equal, stuck):
 def test_a_burst_is_flagged_whole(noisy, length):
     """Alternating readings, of which the first and the last may pass for a flank."""
     at = 1000 + np.arange(length)
-    noisy[at] = noisy.std() * np.random.default_rng(0).uniform(5, 15, length) * (-1) ** at
+    noisy[at] = noisy.std() * default_rng(0).uniform(5, 15, length) * (-1) ** at
     hit = np.flatnonzero(find_outliers(noisy))
     assert set(at[1:-1]) <= set(hit) <= set(at)
 
@@ -87,7 +98,7 @@ def test_a_sound_series_is_left_alone(noisy):
     impact = noisy.copy()
     impact[1500:1507] += 3 * noisy.std() * np.hanning(9)[1:-1]
     assert not find_outliers(impact).any()
-    noise = np.random.default_rng(0).standard_normal(100_000)
+    noise = default_rng(0).standard_normal(100_000)
     assert not find_outliers(noise).any()
     # The share of n samples of white noise scatters by 1/√n.
     assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
@@ -145,8 +156,46 @@ def test_saturation_recurs_at_the_end_of_the_range():
 def test_a_model_that_is_let_go_swings_back():
     """Most of its record is rest, beside which the first swings are further than 20 SD."""
     swings = np.exp(-0.5 * T) * np.cos(5 * T)
-    decay = swings + 1e-4 * np.random.default_rng(0).standard_normal(T.size)
+    decay = swings + 1e-4 * default_rng(0).standard_normal(T.size)
     assert np.abs(decay).max() > 40 * (np.percentile(decay, 95) - np.percentile(decay, 5)) / 3.29
     assert not find_outliers(decay).any()
     decay[300:340] += np.clip(np.arange(40) / 3, 0, 1)  # a reading that comes within three samples
     assert find_outliers(decay)[302:340].all()
+
+
+OFTEN = np.arange(0, 100, 0.005)
+SEA = sea(3, (0.4, 0.9), peak=PERIOD, components=20).at(OFTEN)
+
+
+@given(
+    step=st.floats(0.05, 3.0),
+    offset=st.floats(-10, 10),
+    gain=st.sampled_from([1e-3, 1.0, 1e3]),
+    every=st.sampled_from([1, 2, 4]),
+)
+@settings(max_examples=40)
+def test_the_step_of_an_ideal_rounding_sensor_is_found(step, offset, gain, every):
+    read = gain * step * np.round((SEA[::every] + offset) / step)
+    # Samples are so close that the motion passes one step at a time, to rounding.
+    assert reading_step(read) == pytest.approx(gain * step, rel=1e-6)
+
+
+@pytest.mark.parametrize("every", [8, 10, 13])
+def test_frames_that_were_interpolated_to_a_faster_rate(every):
+    read = 0.5 * np.round(SEA[::every] / 0.5)
+    # Frames fall between samples, so that the last part of a change is missed: one of `every`.
+    between = np.interp(OFTEN, OFTEN[::every] + 0.0013, read)
+    assert reading_step(between) == pytest.approx(0.5, rel=1.1 / every)
+
+
+def test_noise_larger_than_the_step_hides_it():
+    noisy = SEA + 0.05 * default_rng(3).standard_normal(SEA.size)
+    for read in (
+        SEA,
+        np.full(500, 2.0),
+        np.where(OFTEN < 50, SEA, SEA[10_000]),
+    ):  # the last froze once
+        assert np.isnan(reading_step(read))
+    assert np.isnan(reading_step(np.round(noisy, 5)))
+    # Steps well above the noise are seen through it.
+    assert reading_step(0.4 * np.round(noisy / 0.4)) == pytest.approx(0.4, rel=1e-6)

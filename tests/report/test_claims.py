@@ -1,6 +1,7 @@
 """Verdicts on the paper's claims, from studies whose numbers are made up."""
 
 import json
+from math import tau
 
 import numpy as np
 import pytest
@@ -89,7 +90,7 @@ def test_loads_diverge_more_by_the_ends_of_both_intervals(lower, expected):
 
 
 def test_the_slow_part_of_loads_is_judged_without_the_waves():
-    fast, slow = np.sin(2 * np.pi * TIME), np.sin(2 * np.pi * TIME / 12)
+    fast, slow = np.sin(tau * TIME), np.sin(tau * TIME / 12)
     measured = np.broadcast_to((slow + 0.3 * fast)[:, None], SHAPE)
     test = windows({}, measured)
     for part, expected in ((slow - fast, True), (0.3 * fast - slow, False)):

@@ -63,6 +63,10 @@ def changed(result, groups=(), **settings):
     return replace(result, attrs=attrs, groups={**result.groups, **dict(groups)})
 
 
+def without(result, group):
+    return replace(result, groups={k: v for k, v in result.groups.items() if k != group})
+
+
 def test_the_page_holds_its_parts_and_names_nothing_outside_itself(page, result):
     text = page.read_text("utf-8")
     addresses = re.findall(r"""(?:src|href)\s*=\s*["']([^"']*)["']""", text)
@@ -142,8 +146,7 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
         wider = one["mean"] - at["margin"] * np.hypot(one["std"], at["floor"])
         expected = (wider - one["training_mean"]) / one["training_std"]
         np.testing.assert_allclose(lower.get_ydata(), expected, rtol=1e-10)
-    without = {n: g for n, g in result.groups.items() if n != "calibration"}
-    plain = history_figure(replace(result, groups=without), test, training, window)
+    plain = history_figure(without(result, "calibration"), test, training, window)
     for drawn, shown in ((figure, True), (plain, False)):
         texts = [text.get_text() for text in drawn.legends[0].get_texts()]
         assert ("calibrated" in texts) == shown
@@ -197,53 +200,49 @@ def browser():
     started.quit()
 
 
-def told_at(browser, element):
-    """Words beside the time histories, with the mouse on an element."""
-    from selenium.webdriver import ActionChains
-
-    ActionChains(browser).move_to_element(element).perform()
-    return browser.find_element("id", "history-readout").text
-
-
-def state(browser, key):
-    return browser.execute_script(f"return document.getElementById('history').dataset.{key}")
-
-
 def test_the_time_histories_zoom_and_choose(browser, page):
     from selenium.webdriver import ActionChains
     from selenium.webdriver.support.ui import Select, WebDriverWait
 
+    def state(key):
+        return browser.execute_script(f"return document.getElementById('history').dataset.{key}")
+
+    def told_at(element):
+        """Words beside the time histories, with the mouse on an element."""
+        ActionChains(browser).move_to_element(element).perform()
+        return browser.find_element("id", "history-readout").text
+
     browser.get(page.as_uri())
     canvas = browser.find_element("id", "history")
-    whole = state(browser, "range")
+    whole = state("range")
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
     browser.find_element("css selector", "[data-act='+']").click()
-    low, high = map(float, state(browser, "range").split())
+    low, high = map(float, state("range").split())
     assert high - low < 0.7 * (float(whole.split()[1]) - float(whole.split()[0]))
     browser.find_element("css selector", "[data-act=ArrowRight]").click()
-    assert float(state(browser, "range").split()[0]) > low
+    assert float(state("range").split()[0]) > low
     drag = ActionChains(browser).move_to_element_with_offset(canvas, -100, 0)
     drag.click_and_hold().move_by_offset(150, 0).release().perform()
-    assert state(browser, "range") != whole
+    assert state("range") != whole
     ActionChains(browser).double_click(canvas).perform()
-    assert state(browser, "range") == whole
-    assert state(browser, "channel") == "heave"
+    assert state("range") == whole
+    assert state("channel") == "heave"
     Select(browser.find_element("id", "pick-channel")).select_by_index(1)
-    assert state(browser, "channel") == "pitch"
-    opening = state(browser, "cell")
+    assert state("channel") == "pitch"
+    opening = state("cell")
     for place in ("pick-window", "pick-training"):  # each in a file that is loaded now
-        before = state(browser, "cell")
+        before = state("cell")
         Select(browser.find_element("id", place)).select_by_index(1)
-        WebDriverWait(browser, 10).until(lambda _, old=before: state(browser, "cell") != old)
+        WebDriverWait(browser, 10).until(lambda _, old=before: state("cell") != old)
     for place in ("pick-training", "pick-window"):
         Select(browser.find_element("id", place)).select_by_index(0)
-    assert state(browser, "cell") == opening
-    told = told_at(browser, browser.find_element("tag name", "h1"))
+    assert state("cell") == opening
+    told = told_at(browser.find_element("tag name", "h1"))
     assert re.search(r"NRMSE of pitch in this window: deterministic \d\.\d{3}, Bayesian mean", told)
-    assert state(browser, "legend").split(", ") == [
+    assert state("legend").split(", ") == [
         "Bayesian band", "measured", "deterministic", "Bayesian mean"
     ]  # fmt: skip
-    told = told_at(browser, canvas)
+    told = told_at(canvas)
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
     assert browser.get_log("browser") == []
@@ -281,8 +280,7 @@ def test_a_dollar_in_a_label_starts_no_formula(result):
 
 
 def test_inputs_that_are_no_waves_have_no_table_and_no_spectrum_of_them(result):
-    without = {name: group for name, group in result.groups.items() if name != "spectra"}
-    section = waves(replace(result, groups=without))
+    section = waves(without(result, "spectra"))
     assert [each.name for each in section.tables] == ["positions"]
     assert not section.figures
 
@@ -290,8 +288,8 @@ def test_inputs_that_are_no_waves_have_no_table_and_no_spectrum_of_them(result):
 def test_lost_forecasts_are_named(result):
     cell = {"model": "m", "test": "unseen", "training": "t0", "window": 1, "run": "r", "start": 2.0}
     lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
-    judged = replace(result, groups={**result.groups, "statistics/lost": lost})
-    (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
+    notices = summary(changed(result, {"statistics/lost": lost})).notices
+    (notice,) = (text for text in notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
 
 

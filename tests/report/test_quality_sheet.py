@@ -4,7 +4,8 @@ import re
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
+from small_tank import CAMPAIGN, tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
@@ -13,7 +14,7 @@ from seakeep.quality.samples import SamplesKind
 pytest.importorskip("matplotlib")
 
 RUNS = "3101_3 3101_4 3102_1 3102_2 3111_2 3041_2 3061_2 3102_3 3012_1 3102_4 3061_1 3142_1 3031_2"
-CAMPAIGN = """
+CAMERAS = """
 [channels.acc_sb]
 column = "ACC_Heave_SB"
 [channels.acc_ps]
@@ -42,7 +43,7 @@ def test_cameras_that_differ_by_more_than_a_model_errs_are_flagged(tmp_path):
         f'[runs.{n}]\nfile = "${{SEAKEEP_DATA_DIR}}/ntnu_ship_section/{n}.csv"\n'
         for n in RUNS.split()
     ]
-    path.write_text(CAMPAIGN + "".join(runs))
+    path.write_text(CAMERAS + "".join(runs))
     found = {
         name: {e.kind.name: e.value for e in findings_of(run) if e.channel == "heave_of_the_camera"}
         for name, run in read_campaign(path).prepare().items()
@@ -63,19 +64,15 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     from seakeep.report.figures.histories import quality_figure
     from seakeep.report.quality_sheet import channel_rows
 
-    time = np.linspace(0.0, 10.0, 101)
+    time = 0.1 * np.arange(101)
     heave = 3.0 + np.sin(time)
     flags = np.zeros(time.size, dtype=np.int16)
     flags[40:45] = FLAGS["missing"]
     heave[40:45] = np.nan
-    run = xr.Dataset(
-        {
-            "heave": ("time", heave, {"units": "m"}),
-            "pitch": ("time", np.deg2rad(5.0) * np.sin(time), {"units": "rad"}),
-        },
-        {"time": time, "heave_flags": ("time", flags)},
-        {"quality": as_json([Finding(SamplesKind.CONSTANT, "first", "heave", 1.0)])},
-    )
+    found = {"quality": as_json([Finding(SamplesKind.CONSTANT, "first", "heave", 1.0)])}
+    run = record(0.1, found, heave=heave, pitch=np.deg2rad(5.0) * np.sin(time))
+    run = run.assign_coords(heave_flags=("time", flags))
+    run["pitch"].attrs["units"] = "rad"
     rows = {name: cells for name, *cells in channel_rows(run)}
     assert rows["pitch"][0] == "deg"
     assert float(rows["pitch"][2]) == pytest.approx(5.0, rel=2e-3)  # the nearest sample
@@ -99,15 +96,12 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
 
 
 def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, command):
-    from small_tank import CAMPAIGN as SMALL
-    from small_tank import tank_columns, write_csv
-
     for seed, name in enumerate(("first", "second")):
         columns = tank_columns(seed)
         columns["Heave [mm]"][400] += 500.0
         write_csv(tmp_path / f"{name}.csv", columns)
     campaign = tmp_path / "campaign.toml"
-    campaign.write_text(SMALL)
+    campaign.write_text(CAMPAIGN)
     assert "outlier: 1 samples" in command("prepare", campaign)[1]
     folder = tmp_path / "prepared"
     names = {p.name for p in folder.iterdir()}

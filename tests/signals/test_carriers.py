@@ -1,5 +1,7 @@
 """Carriers and the slow position against waves and oscillations that are known."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -48,8 +50,8 @@ def test_the_position_follows_a_slow_oscillation_and_holds_at_rest():
     samples, period, ahead = 6000, 32, 24
     t = np.arange(samples)
     rng = np.random.default_rng(4)
-    slow = sum(0.3 * np.sin(2 * np.pi * t / (32 * p) + rng.uniform(0, 6.28)) for p in (11, 17, 26))
-    quick = 0.05 * np.sin(2 * np.pi * t / 32.7)
+    slow = sum(0.3 * np.sin(tau * t / (32 * p) + rng.uniform(0, 6.28)) for p in (11, 17, 26))
+    quick = 0.05 * np.sin(tau * t / 32.7)
     taps = position_taps([slow + quick], period, period, ahead)
     assert taps.sum() == pytest.approx(1.0, abs=1e-12)  # a vessel at rest is where it is
     place = np.convolve(slow + quick, taps, "valid")

@@ -1,6 +1,7 @@
 """Celerity between two probes: against dispersion, the true spectrum, and wrong records."""
 
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
@@ -40,14 +41,14 @@ def test_the_bound_keeps_the_peak_of_the_next_period_out():
     wide, _ = correlation_peak(*records, DT, (0.0, 8.0))
     # The paper's unbounded peak sits a period late, below every phase speed of the band.
     assert wide - bounded.lag > 1.0
-    assert APART / wide < phase_speed(2 * np.pi * 1.13, DEPTH)
+    assert APART / wide < phase_speed(tau * 1.13, DEPTH)
 
 
 @pytest.mark.parametrize("frequency", [0.4, 0.5, 0.7])
 def test_phase_celerity_is_that_of_linear_dispersion(frequency):
     records, _ = probes(1, noise=0.015)
     found = phase_celerity(*records, DT, APART, DEPTH)
-    expected = float(phase_speed(2 * np.pi * frequency, DEPTH))
+    expected = float(phase_speed(tau * frequency, DEPTH))
     assert found.at(frequency) == pytest.approx(expected, rel=0.03)
     assert np.interp(frequency, found.frequency, found.coherence) > 0.9
     within = np.interp(frequency, found.frequency, found.spread)
@@ -60,7 +61,7 @@ def test_phase_celerity_is_that_of_linear_dispersion(frequency):
 @given(lag=st.floats(0.0, 1.0), period=st.floats(1.2, 3.0))
 def test_a_peak_between_samples(lag, period):
     rng = np.random.default_rng(3)
-    omega = 2 * np.pi / period * np.array([0.9, 1.0, 1.1])
+    omega = tau / period * np.array([0.9, 1.0, 1.1])
     phase = rng.uniform(0, 6.28, 3)
     a, b = (np.cos(np.outer(TIME - shift, omega) + phase).sum(axis=1) for shift in (0.0, lag))
     found, height = correlation_peak(a, b, DT, (-0.4, 1.4))

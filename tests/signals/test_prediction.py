@@ -1,8 +1,11 @@
 """Waves continued by linear prediction."""
 
+from math import tau
+
 import numpy as np
 import pytest
 import seas
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
@@ -17,21 +20,6 @@ from seakeep.signals.prediction import (
     foresee,
     predictable_time,
 )
-
-
-def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
-    rng = np.random.default_rng(1)
-    first, second = 2 * 0.98 * np.cos(0.4), -(0.98**2)
-    series = lfilter([1.0], [1.0, -first, -second], rng.standard_normal((6000, 2)), axis=0)
-    expected = list(series[-2:])
-    for _ in range(20):
-        expected.append(first * expected[-1] + second * expected[-2])
-    found = predict_waves(series + np.array([3.0, -1.0]), 20)
-    spread = series.std(axis=0)
-    # Four periods of 16 samples are 63 coefficients, each with a standard error of 1/√6000.
-    error = np.abs(found - [3.0, -1.0] - expected[2:]).max(axis=0) / spread
-    assert np.all(error < 0.25)
-    assert np.all(np.abs(expected[2:]).max(axis=0) > 0.5 * spread)  # what there was to foresee
 
 
 def jumps_of(series, least=1e-3):
@@ -52,7 +40,7 @@ def test_a_jump_is_far_above_third_differences_of_late_and_is_taken_where_it_sta
     assert shifted[:4] == [100, 101, 103, 104]
     assert shifted[-1] < 130
     assert jumps_of(parabola + 0.1 * (t >= 100), 0.1) == jumps_of(1e9 * t**9, np.inf) == []
-    noise = np.random.default_rng(0).standard_normal(4000)
+    noise = default_rng(0).standard_normal(4000)
     usual = np.sqrt(20.0)  # third differences of white noise: 1, 3, 3, 1
     assert 1000 not in jumps_of(noise + 0.8 * JUMP * usual * (np.arange(4000) == 1000))
     assert jumps_of(noise + 1.3 * JUMP * usual * (np.arange(4000) == 1000)) == [1000]
@@ -104,7 +92,7 @@ def test_short_gaps_are_closed_by_cubics_and_the_newest_by_what_there_is():
 
 
 def test_columns_are_continued_alone_and_a_still_one_stays():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     both = np.stack([np.sin(0.3 * np.arange(300)), np.full(300, 0.7)], axis=1)
     both[:, 0] += 0.1 * rng.standard_normal(300)
     found = predict_waves(both, 30)
@@ -117,7 +105,7 @@ def sea():
     """Elevations at 0, 2 and 4 m, 90 s and the 6 s after them, with 2 % of noise."""
     made, time = seas.sea(4, (0.4, 0.9), peak=1.0, components=400), 0.1 * np.arange(960)
     waves = np.stack([made.at(time, x) for x in (0.0, 2.0, 4.0)], axis=1)
-    return waves + 0.02 * np.random.default_rng(4).standard_normal(waves.shape)
+    return waves + 0.02 * default_rng(4).standard_normal(waves.shape)
 
 
 def foreseen(sea, positions):
@@ -143,9 +131,9 @@ def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
 
 
 def test_departures_of_a_sea_are_the_errors_of_its_prediction():
-    rng, trials = np.random.default_rng(0), 300
-    omega = 2 * np.pi * rng.uniform(0.4, 0.9, (trials, 60, 1))
-    phase = rng.uniform(0, 2 * np.pi, omega.shape)
+    rng, trials = default_rng(0), 300
+    omega = tau * rng.uniform(0.4, 0.9, (trials, 60, 1))
+    phase = rng.uniform(0, tau, omega.shape)
     seas = np.cos(omega * 0.1 * np.arange(460) + phase).sum(axis=1).T
     seas += 0.05 * seas.std() * rng.standard_normal(seas.shape)
     found = foresee(seas[:400], 60, dt=0.1, positions=[np.nan] * trials, depth=3.6)
@@ -160,7 +148,7 @@ def test_departures_of_a_sea_are_the_errors_of_its_prediction():
 
 
 def test_the_power_of_innovations_is_that_of_a_known_process():
-    series = np.random.default_rng(1).standard_normal((6000, 1))
+    series = default_rng(1).standard_normal((6000, 1))
     found = foresee(1.0 + 2.0 * lfilter([1.0], [1.0, -0.8], series, axis=0), 30, dt=0.1,
                     positions=[np.nan], depth=3.6)  # fmt: skip
     # 6000 samples tell an SD to a hundredth.

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
+from said import request_error
 
-from seakeep.errors import RequestError
 from seakeep.signals import complementary_filter, froude_factor, rotation_matrix, transfer_position
 from seakeep.study import to_full_scale
 
@@ -29,7 +29,7 @@ def test_blend_keeps_slow_motion_and_needs_no_drift_removal():
     assert np.sqrt(np.mean(error**2)) < 0.0045
     position = complementary_filter(x, a, 0.05, 0.15, times=2)
     assert (position - slow - fast - drift).std() < 0.5 * 0.006
-    with pytest.raises(RequestError, match=r"the crossover must lie between 0 and 8 Hz"):
+    with request_error(r"the crossover must lie between 0 and 8 Hz"):
         complementary_filter(x, a, 0.05, 9.0)
 
 
@@ -43,30 +43,33 @@ def test_froude(units, power):
 
 def test_words_and_density():
     assert froude_factor("N", 50.0, 1.025) == pytest.approx(1.025 * 125000)
-    with pytest.raises(RequestError, match=r"the unit 'V' is not mechanical"):
+    with request_error(r"the unit 'V' is not mechanical"):
         froude_factor("V", 50.0)
-    with pytest.raises(RequestError, match=r"shape \(time, 3\).* angles: \(4,\)"):
+    with request_error(r"shape \(time, 3\).* angles: \(4,\)"):
         transfer_position(np.zeros((4, 3)), np.zeros(4), [0, 0, 1])
 
 
 def test_full_scale_run():
     own = {"units": "m", "training_std": 0.05, "accuracy": 0.1, "lead_time": 2.0, "x_position": 1.0}
+    facts = {"dt": 0.1, "train_span": (0.0, 0.2), "water_depth": 3.6, "run": "a",
+             "probe_offset": 0.3, "celerity": 2.0}  # fmt: skip
     run = xr.Dataset(
         {"heave": ("time", [0.1, 0.2, 0.1], own)},
         {"time": ("time", [0.0, 0.1, 0.2], {"units": "s"})},
-        {"dt": 0.1, "train_span": (0.0, 0.2), "water_depth": 3.6, "run": "a", "probe_offset": 0.3,
-         "celerity": 2.0, "trained_height": [0.1, 8.0]},
-    )  # fmt: skip
+        facts | {"trained_height": [0.1, 8.0]},  # of mixed units
+    )
     full = to_full_scale(run, 100.0)
     assert_allclose(full["time"], [0.0, 1.0, 2.0])
     assert_allclose(full["heave"], [10, 20, 10])
-    assert (full["heave"].attrs["training_std"], full["heave"].attrs["accuracy"]) == (5.0, 10.0)
-    assert (full["heave"].attrs["lead_time"], full["heave"].attrs["x_position"]) == (20.0, 100.0)
-    assert (run["heave"].attrs, "trained_height" in full.attrs) == (own, False)  # of mixed units
-    assert (full.attrs["dt"], full.attrs["train_span"]) == (1.0, (0.0, 2.0))
-    assert (full.attrs["probe_offset"], full.attrs["celerity"]) == (30.0, 20.0)
-    assert (full.attrs["water_depth"], full.attrs["scale_factor"]) == (360.0, 100.0)
-    with pytest.raises(RequestError, match="at full scale already"):
+    assert full["heave"].attrs == {
+        "units": "m", "training_std": 5.0, "accuracy": 10.0, "lead_time": 20.0, "x_position": 100.0,
+    }  # fmt: skip
+    assert run["heave"].attrs == own
+    assert full.attrs == {
+        "dt": 1.0, "train_span": (0.0, 2.0), "water_depth": 360.0, "run": "a",
+        "probe_offset": 30.0, "celerity": 20.0, "scale_factor": 100.0, "scale": "full",
+    }  # fmt: skip
+    with request_error("at full scale already"):
         to_full_scale(full, 100.0)
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from said import request_error
 from seas import sea
 
-from seakeep.errors import RequestError
 from seakeep.signals import misplaced_probes, probe_separation
 
 DT, DEPTH = 0.05, 3.6
@@ -77,5 +77,5 @@ def test_what_says_nothing_of_positions_is_silent():
     for records in (regular, short, apart, dead):
         assert misplaced(records, wrong) == []
     wave = short["fwd"]
-    with pytest.raises(RequestError, match=r"1e.06 m is too far .* Correct the positions"):
+    with request_error(r"1e.06 m is too far .* Correct the positions"):
         probe_separation(wave, wave, DT, DEPTH, 1e6)

@@ -16,10 +16,16 @@ from seakeep.models.calibration import Judged, learn_margin
 from seakeep.statistics import band_scores, conformal_margin
 
 
-def test_the_coverage_of_exchangeable_scores_is_that_of_the_order_statistic():
+def test_margins_by_hand():
     """Rank ⌈0.9 · 40⌉ of 39: a new score is below it with probability 36/40."""
     scores = np.arange(1.0, 40.0).reshape(1, 39, 1)
-    assert conformal_margin(scores, 0.9, block_length=1).margin[0] == 36.0
+    assert conformal_margin(scores, 0.9, block_length=1).margin == [36.0]
+    # Few blocks warrant less, and give the largest score.
+    few = conformal_margin(scores[:, :12].reshape(2, 6, 1), 0.95, block_length=6)
+    assert (few.margin, few.blocks) == ([12.0], [2])
+    assert few.warranted == pytest.approx([2 / 3])
+    # A band is never narrowed.
+    assert conformal_margin(-scores, 0.9).margin == [0.0]
 
 
 def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
@@ -84,12 +90,12 @@ def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
 
 
 def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
-    mean = np.array([[[0.0], [2.0]], [[np.nan], [np.nan]]])
-    y = np.array([[[3.0], [-2.0]], [[0.0], [0.0]]])
+    mean, std, y = np.array(
+        [[[0.0, 2.0], [np.nan, np.nan]], [[0.0, 1.0], [np.nan, np.nan]], [[3.0, -2.0], [0.0, 0.0]]]
+    )[..., None]
     floor = spread_floor(mean, y)
     assert floor[0] == pytest.approx(np.sqrt((9 + 16) / 2) / 4, rel=1e-15)
     assert spread_floor(mean[1:], y[1:])[0] == 1.0
-    std = np.array([[[0.0], [1.0]], [[np.nan], [np.nan]]])
     scores = scaled_scores(mean, band_scale(std, floor), y)
     assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
     assert np.isinf(scores[1]).all()
@@ -97,23 +103,9 @@ def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
     assert scaled_scores(y * 0, y * 0, y * 0).max() == 0.0
 
 
-def test_few_blocks_warrant_less_and_give_the_largest_score():
-    scores = np.arange(12.0).reshape(2, 6, 1)
-    found = conformal_margin(scores, 0.95, block_length=6)
-    assert found.margin[0] == 11.0
-    assert found.blocks[0] == 2
-    assert found.warranted[0] == pytest.approx(2 / 3)
-
-
-def test_a_band_is_never_narrowed():
-    scores = np.full((4, 50, 1), -1.0) - np.arange(50.0)[:, None]
-    assert conformal_margin(scores, 0.9).margin[0] == 0.0
-
-
 def test_scores_by_hand_and_a_band_that_is_lost():
-    lower, upper = np.array([[0.0], [0.0], [np.nan]]), np.array([[1.0], [2.0], [3.0]])
-    found = band_scores(lower, upper, np.array([[1.5], [0.5], [1.0]]))
-    assert_array_equal(found[:, 0], [0.5, -0.5, np.inf])
+    lower, upper, y = np.array([[0.0, 0.0, np.nan], [1.0, 2.0, 3.0], [1.5, 0.5, 1.0]])[..., None]
+    assert_array_equal(band_scores(lower, upper, y)[:, 0], [0.5, -0.5, np.inf])
     # Lost in more of the windows than the level leaves: no margin is wide enough.
     scores = np.concatenate([np.zeros((3, 10, 1)), np.full((1, 10, 1), np.inf)])
     assert conformal_margin(scores, 0.9, block_length=1).margin[0] == np.inf

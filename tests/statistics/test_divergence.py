@@ -79,10 +79,3 @@ def test_a_perfect_prediction_is_zero_and_its_floor_is_not():
     assert np.all(found.draws == 0.0)
     assert found.of_series == 0.0
     assert 0.0 < found.noise_floor_lower < found.noise_floor < found.noise_floor_upper < 0.05
-
-
-def test_a_draw_that_happens_to_be_constant_takes_the_bandwidth_of_the_series():
-    series = np.concatenate([np.zeros(60), [1.0]])
-    rng = np.random.default_rng(0)
-    found = jsd_interval(series, series, block_length=20, rng=rng, n_series=20)
-    assert np.all(np.isfinite(found.predicted))

@@ -3,17 +3,19 @@
 import dataclasses
 import json
 import re
+from math import tau
 
 import numpy as np
 import pandas as pd
 import pytest
+from said import request_error, warned
 from scipy import signal
 from seas import sea
 from small_tank import write_csv
 
 import seakeep
 from seakeep.campaign.store import write_prepared
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import SeakeepWarning
 from seakeep.models import KINDS
 from seakeep.study import compare, comparison_table, fit_campaign
 
@@ -27,7 +29,7 @@ def halves(tmp_path):
     """One run of 200 s: its first half trains, its second tests."""
     rng = np.random.default_rng(4)
     time = np.arange(2001) / RATE
-    eta = np.sin(2 * np.pi * 0.5 * time + np.sin(time / 9)) + 0.1 * rng.standard_normal(time.size)
+    eta = np.sin(tau * 0.5 * time + np.sin(time / 9)) + 0.1 * rng.standard_normal(time.size)
     heave = signal.lfilter([0.0, 0.1], [1.0, -1.7, 0.8], eta)
     write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": heave})
     return tmp_path
@@ -65,10 +67,10 @@ def test_runs_that_train_and_test_apart(halves):
     (judged,) = compare(fit_campaign(whole), whole)
     assert judged.run == "b"
     assert judged.start == pytest.approx(106.0)  # its history is full
-    with pytest.raises(RequestError, match="no run of the campaign trains a model"):
+    with request_error("no run of the campaign trains a model"):
         fit_campaign(campaign(halves, EXACT, test))
     alone = campaign(halves, EXACT, train)
-    with pytest.raises(RequestError, match="no run of the campaign tests a model"):
+    with request_error("no run of the campaign tests a model"):
         compare(fit_campaign(alone), alone)
 
 
@@ -79,8 +81,8 @@ def test_a_state_that_was_not_measured_is_named(halves):
     table.to_csv(halves / "run.csv", index=False)
     masked = "\n[preparation]\ngaps = 'mask'\n"
     message = r"all: heave was not measured at 41 of 1000 instants"
-    gap = pytest.warns(SeakeepWarning, match="heave missing: 41 samples")
-    with gap, pytest.warns(SeakeepWarning, match=message):
+    gap = warned("heave missing: 41 samples")
+    with gap, warned(message):
         (judged,) = compare(model, campaign(halves, EXACT + masked))
     assert np.isnan(judged.anrmse)
 
@@ -90,11 +92,11 @@ def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
     model = fit_campaign(whole)
     (halves / "campaign.toml").write_text(whole.path.read_text().replace("eta_fwd", "eta_1"))
     other = seakeep.read_campaign(halves / "campaign.toml")
-    with pytest.raises(RequestError, match=r"no channel 'eta_fwd'\. Did you mean 'eta_1'"):
+    with request_error(r"no channel 'eta_fwd'\. Did you mean 'eta_1'"):
         compare(model, other)
     text = re.sub(r"inputs = .*", "inputs = []", whole.path.read_text())
     (halves / "campaign.toml").write_text(text)
-    with pytest.warns(SeakeepWarning, match="the model has no inputs: .* no waves drive"):
+    with warned("the model has no inputs: .* no waves drive"):
         fit_campaign(seakeep.read_campaign(halves / "campaign.toml"))
 
 
@@ -163,9 +165,9 @@ def test_a_test_that_repeats_its_training_is_warned_of(tmp_path):
     eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(time)
     write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": np.roll(eta, 5)})
     whole = campaign(tmp_path, EXACT)
-    with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
+    with warned(REPEATS):
         model = fit_campaign(whole)
-    with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
+    with warned(REPEATS):
         compare(model, whole)
 
 
@@ -181,11 +183,11 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
         + text.replace("test = [100.0, 200.0]", "test = [100.0, 200.0]\nprobe_offset = 0.1")
     )
     whole = seakeep.read_campaign(halves / "campaign.toml")
-    with pytest.warns(SeakeepWarning, match=r"up to 1\.14 s after the instant"):
+    with warned(r"up to 1\.14 s after the instant"):
         model = fit_campaign(whole)
     expected = seakeep.ProbeAlignment(mode="dispersion", surge="measured", offset=-0.3)
     assert model.alignment.settings == expected
-    with pytest.warns(SeakeepWarning, match="ahead of time"):
+    with warned("ahead of time"):
         found = comparison_table(compare(model, whole)).isel(run=0)
     assert str(found["conditional_on"].values) == "surge"
     assert found["probe_offset"] == 0.1
@@ -196,7 +198,7 @@ def sines(folder, periods):
     time = np.arange(1501) / RATE
     text = ""
     for number, (name, each) in enumerate(periods.items()):
-        eta = sum(np.sin(2 * np.pi * time / period) for period in each)
+        eta = sum(np.sin(tau * time / period) for period in each)
         columns = {"t [s]": time, "eta [m]": eta, "z [m]": 0.5 * np.roll(eta, 2)}
         write_csv(folder / f"{name}.csv", columns)
         role = "test" if number == len(periods) - 1 else "train"
@@ -216,10 +218,10 @@ def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, 
     runs = sines(tmp_path, {"shorter": (0.5,), "short": (1.0,), "long": (4.0,), "new": (period,)})
     asked = campaign(tmp_path, EXACT, runs)
     model = fit_campaign(asked)
-    with pytest.warns(SeakeepWarning, match=rf"new: eta_fwd: .* lies {words}.*Train in such"):
+    with warned(rf"new: eta_fwd: .* lies {words}.*Train in such"):
         compare(model, asked)
     write_prepared(asked)
-    with pytest.warns(SeakeepWarning, match=rf"new: eta_fwd: .* lies {words}"):
+    with warned(rf"new: eta_fwd: .* lies {words}"):
         fit_campaign(asked)
 
 
@@ -232,7 +234,7 @@ def test_a_run_that_disagrees_with_the_others_is_warned_of(tmp_path):
         table["z [m]"] = factor * table["z [m]"] + 0.1 * rng.standard_normal(len(table))
         table.to_csv(tmp_path / f"{name}.csv", index=False)
         text += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "train"\n'
-    with pytest.warns(SeakeepWarning, match=r"c disagrees .*; heave moves 1\.(79|8) times as much"):
+    with warned(r"c disagrees .*; heave moves 1\.(79|8) times as much"):
         fit_campaign(campaign(tmp_path, EXACT, text))
 
 
@@ -246,9 +248,9 @@ def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, command):
 
 def test_a_lead_reads_waves_ahead_of_time(halves):
     asked = campaign(halves, f"{EXACT}\nlead = 8")
-    with pytest.warns(SeakeepWarning, match=r"read the inputs up to 0\.7 s after the instant that"):
+    with warned(r"read the inputs up to 0\.7 s after the instant that"):
         model = fit_campaign(asked)
-    with pytest.warns(SeakeepWarning, match=r"of all reads the inputs up to 0\.7 s after"):
+    with warned(r"of all reads the inputs up to 0\.7 s after"):
         compare(model, asked, steps=20)
     with pytest.warns(SeakeepWarning):
         (whole,) = compare(model, asked)
@@ -269,5 +271,5 @@ def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves):
     assert model.settings.damping == 0.7
     assert Damped.from_json(json.loads(json.dumps(model.settings.to_json()))) == model.settings
     wrong = campaign(halves, text.replace("damping", "dampign"))
-    with pytest.raises(RequestError, match=r"no key 'dampign'.*mean 'damping'"):
+    with request_error(r"no key 'dampign'.*mean 'damping'"):
         fit_campaign(wrong)

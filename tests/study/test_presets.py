@@ -28,8 +28,8 @@ OF_TRAINING = {3}
 """Which waves are played, and which part of them trains: the campaign's for `fit`."""
 
 
-def found(folder, preset, door):
-    """Specs of the single model and the ensemble, by the preset of [model] or of a study.
+def found(folder, door):
+    """Specs of the single model and the ensemble, by the paper's preset of [model] or a study.
 
     On the virtual tank's campaign file, without its raw files.
     """
@@ -41,15 +41,15 @@ def found(folder, preset, door):
     text = campaign_text(settings, files, "csv", one_logger=False)
     path = folder / "campaign/campaign.toml"
     path.parent.mkdir()
-    of_model = preset if door == "fit" else {"paper": "recommended", "recommended": "paper"}[preset]
+    of_model = "paper" if door == "fit" else "recommended"
     model = re.sub(r'(\[model\][^[]*?)preset = "\w+"', rf'\1preset = "{of_model}"', text)
     path.write_text(re.sub(r'(\[preparation\]\n)preset = "\w+"\n', r"\1", model), "utf-8")
     if door == "fit":
         campaign, study = read_campaign(path), None
         tables = [campaign.model(), campaign.model().model_copy(update={"kind": ENSEMBLE})]
     else:
-        act = next(act for act in ACTS if act.preset == preset and not act.without_drift)
-        says = f'[study]\ncampaign = "../campaign/campaign.toml"\npreset = "{preset}"\n'
+        act = next(act for act in ACTS if act.preset == "paper" and not act.without_drift)
+        says = '[study]\ncampaign = "../campaign/campaign.toml"\npreset = "paper"\n'
         file = folder / act.name / "study.toml"
         file.parent.mkdir()
         file.write_text(says if door == "study" else study_text(act, Size(), 0), "utf-8")
@@ -57,7 +57,7 @@ def found(folder, preset, door):
         campaign, study = read.campaign, read.settings
         tables = list(study.models.values())[:2]
     aligned = can_align(campaign.settings, campaign.model().inputs)
-    above = None if study is None else preset
+    above = study and "paper"
     specs = [resolve_model(each, PERIOD, DT, preset=above, aligned=aligned).spec for each in tables]
     return SimpleNamespace(campaign=campaign, specs=specs, study=study)
 
@@ -94,7 +94,7 @@ def paper(found):
 
 @pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
 def test_the_papers_column_is_taken_in_every_row(tmp_path, door):
-    taken = found(tmp_path, "paper", door)
+    taken = found(tmp_path, door)
     checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)
     same = {row for row, (theirs, ours) in ROWS.items() if ours.startswith(("the same", theirs))}

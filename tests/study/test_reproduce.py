@@ -1,6 +1,7 @@
 """The three acts of ``seakeep reproduce``: one tank, the same windows, and a page over them."""
 
 import warnings
+from math import tau
 
 import numpy as np
 import pytest
@@ -25,28 +26,31 @@ def record(name, seconds, rng):
     """A made-up run on one logger at 50 Hz: linear waves, and a drift in surge and loads."""
     t = np.arange(round(seconds * RATE) + 1) / RATE
     regular = {"regular_1_5": [0.86], "regular_2": [0.75], "regular_3": [0.61]}
-    omega = 2 * np.pi * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
-    turn = omega * t[:, None] + rng.uniform(0, 2 * np.pi, omega.size)
+    omega = tau * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
+    turn = omega * t[:, None] + rng.uniform(0, tau, omega.size)
 
-    drift = np.sin(2 * np.pi * t / 29.9) + 0.3 * np.sin(2 * np.pi * t / 47.0)
-    made = {}
-    for key, unit, amplitude, lag, power, drifts in (
-        ("kn_fwd", "mm", 20.0, 0.0, 0, 0.0),
-        ("kn_cog", "mm", 20.0, omega**2 * 3.67 / 9.81, 0, 0.0),
-        ("heave", "m", 0.01, 2.0, 0, 0.0),
-        ("pitch", "deg", 1.0, 1.0, 0, 0.0),
-        ("rate_y", "deg/s", 1.0, 1.0, 1, 0.0),
-        ("acceleration_x", "m/s^2", 0.008, 2.5, 2, 0.0),
-        ("acceleration_z", "m/s^2", 0.01, 2.0, 2, 0.0),
-        ("surge", "m", 0.008, 2.5, 0, 0.25),
-        ("mooring_bow", "N", 0.1, 2.5, 0, 0.4),
-        ("mooring_stern", "N", -0.1, 2.5, 0, -0.4),
-    ):
-        waves = omega**power * np.cos(turn - lag + 0.5 * np.pi * power)
-        x = 2.0 * (unit == "N") + amplitude * waves.sum(axis=1) + drifts * drift
-        noise = 0.01 * x.std() * rng.standard_normal(x.size)
-        made[key] = ("time", x + noise, {"units": unit})
-    return xr.Dataset(made, coords={"time": ("time", t, {"units": "s"})})
+    def waves(amplitude, lag, rate=0):
+        return (amplitude * (1j * omega) ** rate * np.exp(1j * (turn - lag))).real.sum(axis=1)
+
+    drift = np.sin(tau * t / 29.9) + 0.3 * np.sin(tau * t / 47.0)
+    load = waves(0.1, 2.5) + 0.4 * drift
+    made = {
+        "kn_fwd": (waves(20.0, 0.0), "mm"),
+        "kn_cog": (waves(20.0, omega**2 * 3.67 / 9.81), "mm"),
+        "heave": (waves(0.01, 2.0), "m"),
+        "pitch": (waves(1.0, 1.0), "deg"),
+        "rate_y": (waves(1.0, 1.0, 1), "deg/s"),
+        "acceleration_x": (waves(0.008, 2.5, 2), "m/s^2"),
+        "acceleration_z": (waves(0.01, 2.0, 2), "m/s^2"),
+        "surge": (waves(0.008, 2.5) + 0.25 * drift, "m"),
+        "mooring_bow": (2.0 + load, "N"),
+        "mooring_stern": (2.0 - load, "N"),
+    }
+    noisy = {
+        name: ("time", x + 0.01 * x.std() * rng.standard_normal(x.size), {"units": unit})
+        for name, (x, unit) in made.items()
+    }
+    return xr.Dataset(noisy, coords={"time": ("time", t, {"units": "s"})})
 
 
 def play_small(settings, out, executor, progress):

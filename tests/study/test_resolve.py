@@ -63,11 +63,6 @@ def resolved(stated, period=2.0, **how):
             {"alignment.mode": ("effective", "preset"), "alignment.surge": ("measured", "preset")},
         ),
         (
-            {"preset": "paper", "alignment": {"surge": "none"}},
-            {"aligned": True},
-            {"alignment.surge": ("none", "stated")},
-        ),
-        (
             {"kind": "fir"},
             {"preset": "paper", "aligned": True},
             {"input_delays": (60, "preset"), "alignment.surge": ("measured", "preset")},

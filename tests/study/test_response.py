@@ -9,13 +9,13 @@ from seakeep.study.judge import is_regular, regular_response
 
 DT, FREQUENCY = 0.05, 0.86
 TIME = DT * np.arange(1, 161)
+TURN = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
 
 
 def groups():
     """Two training sets, three windows, of one channel named surge."""
-    turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
-    measured = 0.9 + 0.1 * np.cos(turn)
-    forecast = 0.9 + 0.3 + 0.08 * np.cos(turn + np.radians(40.0))
+    measured = 0.9 + 0.1 * np.cos(TURN)
+    forecast = 0.9 + 0.3 + 0.08 * np.cos(TURN + np.radians(40.0))
     test = cells(
         ["surge"], TIME, measured=measured[..., None], judged=np.ones((2, 3), bool),
         run=["wave"] * 3, mean=np.tile(forecast[..., None], (1, 2, 1, 1, 1)),
@@ -26,8 +26,12 @@ def groups():
     return {"tests/t": test, "runs": runs}
 
 
+def parts_of(made):
+    return regular_response(made, "t").sel(model="m", channel="surge")
+
+
 def test_the_parts_are_what_the_forecast_was_made_of():
-    found = regular_response(groups(), "t").sel(model="m", channel="surge")
+    found = parts_of(groups())
     # The record is not a whole number of periods, so that its own SD differs from 0.1/√2.
     own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
     offset = np.sqrt(np.mean((0.3 / own) ** 2))
@@ -41,9 +45,8 @@ def test_the_parts_are_what_the_forecast_was_made_of():
 def test_the_phase_is_the_circular_mean_over_cells():
     made = groups()
     leads = np.radians([170.0, -160.0, -160.0])[:, None]  # the last of them past half a turn
-    turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
-    made["tests/t"]["mean"][:] = np.cos(turn + leads)[..., None]
-    found = regular_response(made, "t")["phase_lead"].sel(model="m", channel="surge")
+    made["tests/t"]["mean"][:] = np.cos(TURN + leads)[..., None]
+    found = parts_of(made)["phase_lead"]
     mean = np.exp(1j * leads).mean()
     assert found == pytest.approx(np.degrees(np.angle(mean)), abs=1e-6)
     assert found.attrs["units"] == "deg"
@@ -53,8 +56,7 @@ def test_the_squares_add_up_to_that_of_the_error():
     made = groups()
     rng = np.random.default_rng(0)
     made["tests/t"]["mean"] += 0.05 * rng.standard_normal(made["tests/t"]["mean"].shape)
-    found = regular_response(made, "t").sel(model="m", channel="surge")
-    test = made["tests/t"]
+    found, test = parts_of(made), made["tests/t"]
     error = ((test["mean"] - test["measured"]) ** 2).mean("time")
     expected = float((error / test["measured"].var("time", ddof=1)).mean())
     squares = sum(float(found[f"error_{key}"]) ** 2 for key in ("offset", "wave", "rest"))

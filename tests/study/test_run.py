@@ -5,17 +5,20 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error, request_error, warned
 from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, RequestError
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run_study
+from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import joined
-from seakeep.study.plan import make_plan
+from seakeep.study.plan import make_plan, warn_of_slow_study
 from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
 from seakeep.study.store import LOCK, RESULT, UNITS, UnitFolder
 
@@ -83,7 +86,7 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
     assert not (out / "study.nc").exists()
     for name in (f"{UNITS}/.half.nc.tmp", "notes.tmp"):
         (out / name).write_bytes(b"\x89H")
-    with pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"):
+    with warned(r"removed 1 unfinished file\(s\) of a killed run"):
         again = run_study(study, out, progress=lambda *each: told.append(each))
     assert (out / "notes.tmp").exists()
     assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
@@ -96,7 +99,7 @@ def test_one_process_works_in_a_folder(study_folder, finished):
 
     def second(done, total, what):
         if what == "statistics and densities":
-            with pytest.raises(RequestError, match=r"another process works on the study in .*sha"):
+            with request_error(r"another process works on the study in .*sha"):
                 run_study(study, out)
             refused.append(what)
 
@@ -125,7 +128,7 @@ def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
     second.open("second")
     assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
     second.write("cell", CELL)
-    with pytest.raises(RequestError, match="holds the results of another study"):
+    with request_error("holds the results of another study"):
         UnitFolder(tmp_path, "one").open("first")
 
 
@@ -134,17 +137,21 @@ def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_pa
     shutil.copy(finished.folder / RESULT, tmp_path)
     assert_same(finished, run_study(study, tmp_path, progress=lambda *each: told.append(each[2])))
     assert told == ["finished before"]
-    with pytest.raises(RequestError, match="holds the results of another study"):
+    with request_error("holds the results of another study"):
         UnitFolder(tmp_path, "two").check()
     (tmp_path / RESULT).write_bytes(b"")
-    with pytest.raises(DataError, match="was cut off, altered or damaged"):
+    with data_error("was cut off, altered or damaged"):
         UnitFolder(tmp_path, study.digest).check()
 
 
-def test_results_that_name_no_study_are_not_overwritten(tmp_path):
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [(f"{UNITS}/one.nc", "does not say of which study"), (RESULT, "it has no checksum")],
+)
+def test_results_that_name_no_study_are_not_overwritten(result, words, tmp_path):
     (tmp_path / UNITS).mkdir()
-    (tmp_path / UNITS / "one.nc").write_bytes(b"")
-    with pytest.raises(RequestError, match=r"holds results, and .* does not say of which study"):
+    (tmp_path / result).write_bytes(b"")
+    with pytest.raises((RequestError, DataError), match=words):
         UnitFolder(tmp_path, "one").open("first")
 
 
@@ -154,7 +161,7 @@ def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folde
     plan = make_plan(read_study(path))
     assert {window.run for window in plan.tests["irregular"]} == {"unseen"}
     path.write_text(path.read_text("utf-8") + '[tests.regular]\nwaves = "regular"\n', "utf-8")
-    with pytest.raises(RequestError, match=r"not stated: irregular.*State the waves of a run"):
+    with request_error(r"not stated: irregular.*State the waves of a run"):
         make_plan(read_study(path))
 
 
@@ -165,7 +172,7 @@ def test_models_that_no_window_judges_are_named(study_folder):
     path.write_text(text.format(scheme, 3), "utf-8")
     assert len({window.run for window in make_plan(read_study(path)).windows}) == 3
     path.write_text(text.format(scheme, 2), "utf-8")
-    with pytest.warns(SeakeepWarning, match=r"for the training sets without \w+, whose.*least 3"):
+    with warned(r"for the training sets without \w+, whose.*least 3"):
         plan = make_plan(read_study(path))
     assert len({window.run for window in plan.windows}) == 2
 
@@ -217,3 +224,50 @@ def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(t
         assert found.keys() == alone.keys()
         for name, group in found.items():
             xr.testing.assert_identical(group, alone[name])
+
+
+def described(folder):
+    study = read_study(folder / "study.toml")
+    return describe_study(study, make_plan(study))
+
+
+def test_a_run_that_was_learnt_from_is_found_and_named(study_folder):
+    files = sorted(study_folder.glob("*.csv"))
+    files[-1].write_bytes(files[0].read_bytes())  # the test run is a training run
+    with warned("^unseen: file is one of first too"):
+        found = described(study_folder)["repeats"]
+    assert list(found["run"].values) == ["unseen"]
+    assert found["share"].item() > 0.5  # as far as the last of two random windows reaches
+    assert found["correlation"].item() == pytest.approx(1.0, abs=1e-3)
+    words = words_of_repeats(found)
+    assert words.startswith("The input 'eta_fwd' of unseen repeats training input: ")
+    assert words.endswith(
+        "turned by 0 degrees (correlation 1.000). Tests there show memory, not skill."
+    )
+
+
+def test_seas_of_their_own_repeat_nothing(study_folder):
+    assert "repeats" not in described(study_folder)
+
+
+DRIFT = 60.0
+"""Period of the drift put onto heave, s: the two training runs hold four periods in all."""
+
+
+def test_a_study_with_short_windows_is_told_once(study_folder, monkeypatch):
+    """The tutorial's runs, their heave on a slow drift three times as large as the waves."""
+    for path in study_folder.glob("*.csv"):
+        table = pd.read_csv(path, sep=";")
+        time, heave = table.iloc[:, 0], table.filter(like="HEAVE").columns
+        size = 3 * np.sqrt(2) * table[heave].std()
+        table[heave] += np.outer(np.sin(2 * np.pi * time / DRIFT), size)
+        table.to_csv(path, sep=";", index=False, float_format="%.6g")
+    study = read_study(study_folder / "study.toml")
+    plan = make_plan(study)
+    with warned(r"slow motion of heave \(period [56]\d") as caught:
+        warn_of_slow_study(plan)
+    assert len(caught) == 1
+    assert "windows of 'bayesian' in" in str(caught[0].message)  # 20 T at most
+    monkeypatch.setattr("seakeep.study.run._computed", lambda *_: pytest.fail("told before"))
+    with warned("slow motion"), pytest.raises(pytest.fail.Exception):
+        run_study(study, study_folder / "out")

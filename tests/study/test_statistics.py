@@ -7,11 +7,11 @@ import pytest
 import xarray as xr
 from cells import cells
 from numpy.testing import assert_allclose, assert_array_equal
+from said import warned
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
 from seakeep.core.density import density_grid
-from seakeep.errors import SeakeepWarning
 from seakeep.metrics import nrmse
 from seakeep.models.training import gather, system_of
 from seakeep.report.tables import ratio_of
@@ -117,30 +117,23 @@ def four():
     )  # fmt: skip
 
 
-def test_coverage_by_hand():
-    row = band_tables(four(), None, 0.95)["coverage"].sel(
-        model="m", band="members", against="measured"
-    )
-    assert_allclose(row["inside"], 0.5, rtol=1e-15)
-    assert_allclose(row["below"], 0.5, rtol=1e-15)
-    # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).
-    heave = 32.5 / np.sqrt(8 / 7) * np.mean([1, 0.5, 1])
-    assert_allclose(
-        row["relative_width"].sel(channel=["heave", "pitch"]), [heave, heave / 10], rtol=1e-12
-    )
-
-
-def test_a_calibrated_band_that_is_infinite_counts_neither_as_inside_nor_as_wide():
+def test_coverage_by_hand_where_a_calibrated_band_is_infinite():
+    """What is infinite counts neither as inside nor as wide."""
     margin = [[[1.0, 1.0], [np.inf, 1.0]]]
     calibration = xr.Dataset(
         {"margin": (("ensemble", "training", "channel"), margin)}, {"ensemble": ["m"]}
     )
     tables = band_tables(four(), calibration, 0.95)
-    row = tables["coverage"].sel(model="m", band="calibrated", against="measured")
-    assert_allclose(row["inside"], 0.5)
-    # Widths of 62 and 7 in turns; of heave in the first training set alone.
-    heave = 34.5 / np.sqrt(8 / 7) * np.mean([1, 0.5])
-    assert row["relative_width"].sel(channel="heave") == pytest.approx(heave, rel=1e-12)
+    rows = tables["coverage"].sel(model="m", against="measured")
+    assert_allclose(rows["inside"], 0.5, rtol=1e-15)
+    assert_allclose(rows["below"].sel(band="members"), 0.5, rtol=1e-15)
+    # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10); of 62
+    # and 7 where calibrated, of heave in the first training set alone.
+    members = 32.5 / np.sqrt(8 / 7) * np.mean([1, 0.5, 1])
+    calibrated = 34.5 / np.sqrt(8 / 7) * np.mean([1, 0.5])
+    width = rows["relative_width"].sel(band=["members", "calibrated"])
+    assert_allclose(width.sel(channel="heave"), [members, calibrated], rtol=1e-12)
+    assert width.sel(channel="pitch")[0] == pytest.approx(members / 10, rel=1e-12)
     bands = tables["bands"].sel(model="m", band="calibrated", part="all")
     assert_allclose(bands["inside"], 0.5)
     assert_allclose(bands["width"], 34.5)
@@ -179,9 +172,10 @@ ridge_scale = "absolute"
 
 def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
     put_tutorial(tmp_path, STUDY.replace("length = 6", "length = 20") + WILD)
-    with pytest.warns(SeakeepWarning, match=r"^6 forecast\(s\) diverged and are left out: model "
-        r"'wild', training set 't00', window 0 of 'unseen' \(unseen from .* and 1 more"
-    ):  # fmt: skip
+    with warned(
+        r"^6 forecast\(s\) diverged and are left out: model 'wild', training set 't00', window 0 "
+        r"of 'unseen' \(unseen from .* and 1 more"
+    ):
         found = run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}

@@ -1,5 +1,7 @@
 """Waves carried to the vessel by predicted surge; two test sets, one regular."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from seas import Sea
@@ -83,8 +85,8 @@ def write_run(path, seed, seconds, frequencies, grows=0.0):
     """A vessel that surges slowly and heaves with the wave where it is."""
     rng = np.random.default_rng(seed)
     time, f = np.arange(round(seconds * RATE) + 1) / RATE, np.asarray(frequencies)
-    sea = Sea(f, 0.02 * np.ones(f.size), rng.uniform(0, 2 * np.pi, f.size), DEPTH)
-    surge = 0.4 * np.sin(2 * np.pi * time / 17)
+    sea = Sea(f, 0.02 * np.ones(f.size), rng.uniform(0, tau, f.size), DEPTH)
+    surge = 0.4 * np.sin(tau * time / 17)
     envelope = np.clip(time / grows, 0, 1) if grows else 1.0
     noise = 1e-4 * rng.standard_normal((2, time.size))
     heave = 0.8 * envelope * sea.at(time, surge) + noise[1]

@@ -1,11 +1,12 @@
-"""Where a study learns and where it tests: windows apart, several sets, start-up cut off."""
+"""What a study file says, and where the study learns and tests: windows apart, several sets."""
 
 import numpy as np
 import pytest
 import xarray as xr
+from said import request_error
 
-from seakeep.errors import RequestError
-from seakeep.study.plan import Needs, choose_tests, choose_training
+from seakeep.study import read_study
+from seakeep.study.plan import Needs, choose_tests, choose_training, windows_overlap
 from seakeep.study.settings import StudySettings
 from seakeep.toml import validated
 
@@ -22,7 +23,57 @@ def recorded(samples, *, waves="irregular", sea_state="", **spans):
 
 def settings(**tables):
     content = {"study": {"campaign": "campaign.toml", "seed": 5}, **tables}
-    return validated(StudySettings, content, "s.toml", "study")
+    return validated(StudySettings, content, "study.toml", "study")
+
+
+def test_what_is_left_out_is_the_papers():
+    stated = settings()
+    assert stated.study.preset == "paper"
+    kinds = {name: model.kind for name, model in stated.models.items()}
+    assert kinds == {"deterministic": "hankel_dmdc", "bayesian": "bayesian_hankel_dmdc"}
+    assert list(stated.tests) == ["irregular"]
+
+
+@pytest.mark.parametrize(
+    ("words", "tables"),
+    {
+        "training.window: unknown key, received 3. Did you mean 'w": {"training": {"window": 3}},
+        r"^study.toml: 2 mistakes(.|\n)*training.windows: received 0(.|\n)*length: received -1":
+            {"training": {"windows": 0}, "tests": {"irregular": {"length": -1.0}}},
+        "'windows' belongs to scheme = 'hal": {"training": {"scheme": "leave_out", "windows": 3}},
+        "'leave_out' belongs to scheme = 'leave_out'": {"training": {"leave_out": "run"}},
+        r"densities_of = 'regular' is not a table": {"statistics": {"densities_of": "regular"}},
+        "the name 'a/b' must hold a letter or digit, and nothing beside": {"tests": {"a/b": {}}},
+        "the name '_-' must hold a letter or digit": {"tests": {"_-": {}}},
+        r"seed: received 18446.* below 2\^64": {"study": {"campaign": "c.toml", "seed": 2**64}},
+    }.items(),
+)  # fmt: skip
+def test_what_no_study_file_may_say(tables, words):
+    with request_error(words):
+        settings(**tables)
+
+
+def test_the_digest_follows_settings_and_raw_files_and_no_words(study_folder):
+    path = study_folder / "study.toml"
+    text = path.read_text("utf-8")
+
+    def digest(seed="seed = 3", more=""):
+        path.write_text(text.replace("seed = 3", seed) + more, "utf-8")
+        return read_study(path).digest
+
+    before = digest()
+    assert digest('seed = 3\nname = "other"', "\n[output]\npaper = true\n") == before
+    assert digest("seed = 4") != before
+    with (study_folder / "run2.csv").open("a", encoding="utf-8") as file:
+        file.write("\n")
+    assert digest() != before
+
+
+def test_overlap_of_windows_by_hand():
+    # b is half covered by a, a is half covered by b, c lies in another run.
+    spans = [("x", 0.0, 10.0), ("x", 5.0, 15.0), ("y", 0.0, 10.0)]
+    # 200 cells a window: the share is exact to one cell.
+    assert windows_overlap(spans) == pytest.approx(1 / 3, abs=0.005)
 
 
 def samples_of(run, start, stop):
@@ -60,26 +111,20 @@ def windows_of(runs=RUNS, name="set", steps=50, sets=(), **table):
     )
 
 
-def test_training_windows_apart_share_no_snapshot():
-    found = training(placement="apart", windows=None)
-    for name, run in RUNS.items():
-        stops = sorted(
-            samples_of(run, *each.spans[0][1:])[1] for each in found if each.runs == (name,)
-        )
-        assert np.diff(stops).min() >= NEEDS.snapshots
-    # 501 and 401 samples from the spans' ends back in steps of 120, as long as 150 remain.
-    assert [each.runs[0] for each in found].count("a") == 3
-    assert [each.runs[0] for each in found].count("b") == 3
-
-
-def test_every_training_window_holds_the_largest_draw_with_its_history():
-    for placement in ("random", "apart"):
-        for each in training(placement=placement, windows=6):
-            name, begin, stop = each.spans[0]
-            first, last = samples_of(RUNS[name], begin, stop)
-            assert begin >= RUNS[name].attrs["train_span"][0]
-            assert stop <= RUNS[name].attrs["train_span"][1]
-            assert last - first + 1 >= NEEDS.snapshots + NEEDS.history
+def test_training_windows_hold_the_largest_draw_with_its_history():
+    for placement, windows in {"random": 6, "apart": None}.items():
+        found = training(placement=placement, windows=windows)
+        # 501 and 401 samples from the spans' ends back in steps of 120, as long as 150 remain.
+        assert len(found) == 6
+        for name, run in RUNS.items():
+            spans = [each.spans[0][1:] for each in found if each.runs == (name,)]
+            first, stop = run.attrs["train_span"]
+            assert all(first <= begin and end <= stop for begin, end in spans)
+            places = np.array([samples_of(run, *each) for each in spans])
+            assert np.ptp(places, axis=1).min() >= NEEDS.snapshots + NEEDS.history - 1
+            if placement == "apart":  # they share no snapshot
+                assert len(spans) == 3
+                assert np.diff(np.sort(places[:, 1])).min() >= NEEDS.snapshots
 
 
 def test_random_training_windows_are_drawn_without_replacement_from_all_feasible_stops():
@@ -88,7 +133,7 @@ def test_random_training_windows_are_drawn_without_replacement_from_all_feasible
     # 352 and 252 stops are feasible; all of them are used when as many are asked for.
     every = training(windows=352 + 252)
     assert len({each.spans for each in every}) == 604
-    with pytest.raises(RequestError, match=r"605 windows were asked for and 604 are feasible"):
+    with request_error(r"605 windows were asked for and 604 are feasible"):
         training(windows=605)
 
 
@@ -108,7 +153,7 @@ def test_test_windows_apart_share_no_instant_and_all_that_fit_are_taken():
 
 def test_a_window_too_long_is_answered_with_the_longest_in_periods():
     # 500 instants are 15 periods, and a test span of 399 samples holds 398 after a start: 11.94.
-    with pytest.raises(RequestError, match=r"\(length at most 11.9 periods\)"):
+    with request_error(r"\(length at most 11.9 periods\)"):
         windows_of(steps=500)
 
 
@@ -119,7 +164,7 @@ def test_the_start_up_of_a_test_span_is_cut_off():
     without = windows_of(wave, windows=None, placement="random")
     # What remains before the first start is the delay history.
     assert min(w.start for w in without) == pytest.approx(NEEDS.history * DT)
-    with pytest.raises(RequestError, match=r"tests.set: no window is feasible.*start-up"):
+    with request_error(r"tests.set: no window is feasible.*start-up"):
         windows_of(wave, startup=66.0)
 
 
@@ -174,5 +219,5 @@ def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
     assert left_out(training(**given)) == [("a", "a_2"), ("b",)]
     assert left_out(training(**given, leave_out="run")) == [("a",), ("b",), ("a_2",)]
     del runs["b"]
-    with pytest.raises(RequestError, match="a run with its repetitions of a, a_2 leaves no run"):
+    with request_error("a run with its repetitions of a, a_2 leaves no run"):
         training(**given)

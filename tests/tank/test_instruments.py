@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from seakeep.tank.instruments import _immersed, clock_instants, record_run, slap_pulses, trigger
 from seakeep.tank.play import generator, play_run, truth
@@ -58,7 +59,7 @@ def test_dropouts_take_the_stated_share(settings, rig):
     probes = {"us": settings.instruments.probes["us_fwd"].model_copy(update={"dropouts": 0.05})}
     instruments = settings.instruments.model_copy(update={"probes": probes})
     made = settings.model_copy(update={"instruments": instruments})
-    record = record_run(play_run(made, "irregular_1", rig), np.random.default_rng(0))["wave_probes"]
+    record = record_run(play_run(made, "irregular_1", rig), default_rng(0))["wave_probes"]
     lost = np.isnan(record["us"].values)
     # About 120 bursts of uniform length: the share scatters by a tenth.
     assert lost.mean() == pytest.approx(0.05, rel=0.3)
@@ -72,7 +73,7 @@ def test_slap_is_on_the_measured_load_alone(records, played, short):
     assert error.std() > 1.2 * short.instruments.load_noise
     instruments = short.instruments.model_copy(update={"slap": {}})
     quiet = replace(played, settings=short.model_copy(update={"instruments": instruments}))
-    again = record_run(quiet, np.random.default_rng(1))["loads"]
+    again = record_run(quiet, default_rng(1))["loads"]
     error = again["mooring_bow"].values - played.loads(t)[0]
     assert error.std() == pytest.approx(short.instruments.load_noise, rel=0.02)
 
@@ -81,13 +82,13 @@ def test_slap_pulses_start_where_the_line_is_wetted():
     time = np.arange(0.0, 100.0, 0.002)
     wet = (time % 5.0) > 4.0
     slap = SlapSettings(mean=0.2)
-    pulses = slap_pulses(time, wet, slap, np.random.default_rng(0))
+    pulses = slap_pulses(time, wet, slap, default_rng(0))
     first = np.flatnonzero(pulses)[0]
     assert time[first] == pytest.approx(4.002, abs=0.005)
     heights = [np.abs(pulses[np.abs(time - at - 0.15) < 0.15]).max() for at in np.arange(4, 99, 5)]
     # Exponential with mean 0.2 N, less what the decay takes before the first crest.
     assert 0.05 < np.mean(heights) < 0.25
-    assert np.all(slap_pulses(time, wet & False, slap, np.random.default_rng(0)) == 0.0)
+    assert np.all(slap_pulses(time, wet & False, slap, default_rng(0)) == 0.0)
 
 
 def test_truth_holds_what_the_chain_is_judged_against(played):

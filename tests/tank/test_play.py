@@ -4,9 +4,9 @@ import tomllib
 import numpy as np
 import pandas as pd
 import pytest
+from said import request_error
 
 from seakeep.campaign import read_campaign
-from seakeep.errors import RequestError
 from seakeep.tank.play import check_settings, play, truth
 from seakeep.tank.settings import SpectrumSettings
 
@@ -92,16 +92,16 @@ def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):
     record = tmp_path / "raw" / "regular_2" / "mru.csv"
     kept = record.read_text("utf-8")
     record.write_text("time [s],heave [m]\n0.0,0.1\n", "utf-8")
-    with pytest.raises(RequestError, match=r"mru\.csv exists and is not a raw file that"):
+    with request_error(r"mru\.csv exists and is not a raw file that"):
         again()
     record.write_text(kept, "utf-8")
     hidden = (tmp_path / "truth").rename(tmp_path / "apart")
-    with pytest.raises(RequestError, match=r"\w+\.csv exists, and no truth of the tank beside it"):
+    with request_error(r"\w+\.csv exists, and no truth of the tank beside it"):
         again()
     hidden.rename(tmp_path / "truth")
     (tmp_path / "campaign.toml").write_text("[campaign]\nname = 'mine'\n", "utf-8")
     before = digests(tmp_path)
-    with pytest.raises(RequestError, match=r"campaign\.toml exists and is not a campaign"):
+    with request_error(r"campaign\.toml exists and is not a campaign"):
         again()
     assert digests(tmp_path) == before
 
@@ -111,5 +111,18 @@ def test_seas_beyond_the_coefficients_are_refused(short):
     spectrum = SpectrumSettings(height=0.1, peak_period=2.0, band=(0.3, 3.0))
     run = short.runs["irregular_1"].model_copy(update={"spectrum": spectrum})
     bad = short.model_copy(update={"facility": facility, "runs": {"wide": run}})
-    with pytest.raises(RequestError, match=r"runs\.wide: frequencies .* leave the band"):
+    with request_error(r"runs\.wide: frequencies .* leave the band"):
         check_settings(bad)
+
+
+def test_the_command_writes_one_logger_and_the_truth(tmp_path, command):
+    short, out = tmp_path / "short.toml", tmp_path / "out"
+    short.write_text(
+        "[runs.sea]\nstartup = 5.0\nduration = 30.0\n"
+        "spectrum = { height = 0.15, peak_period = 2.0 }\n"
+        "[runs.regular]\nstartup = 5.0\nduration = 20.0\nwavelength = 2.8\nheight = 0.1\n",
+        "utf-8",
+    )
+    command("tank", "--settings", short, "--out", out, "--seed", 3, "--one-logger", "--run", "sea")
+    assert (out / "raw" / "sea" / "all.csv").is_file()
+    assert (out / "truth" / "sea.nc").is_file()

@@ -3,8 +3,8 @@
 import chain_on_tank
 import pytest
 from chain_on_tank import CLOCKS, MOTIONS
+from said import warned
 
-from seakeep import SeakeepWarning
 from seakeep.study import fit_campaign
 
 pytest.importorskip("numba")
@@ -17,7 +17,7 @@ def test_a_campaign_without_its_truth_is_prepared_and_fitted(delivered, prepared
     assert not list(delivered.campaign.path.parent.glob("**/truth*"))
     assert tuple(prepared) == RUNS
     # 20 encounter periods of each run train, and the vessel surges on its moorings in 30 s.
-    with pytest.warns(SeakeepWarning, match=r"hold [23]\.\d periods of the slow motion of surge"):
+    with warned(r"hold [23]\.\d periods of the slow motion of surge"):
         model = fit_campaign(delivered.campaign)
     assert set(model.training.runs) == set(RUNS)
     assert set(MOTIONS) <= set(model.states)

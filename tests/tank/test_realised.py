@@ -1,10 +1,12 @@
-"""What `benchmarks/tank_figures.py` says of the sea and the motions that are played."""
+"""What `benchmarks/tank_figures.py` says of what is played, and what is judged of it."""
 
 import numpy as np
 import pytest
 from tank_figures import comparison, realise
 
-from seakeep.tank.play import play_run
+from seakeep.core.metrics import slack_share
+from seakeep.signals.waves import noise_floor
+from seakeep.tank.play import play_run, truth
 
 pytest.importorskip("numba")
 
@@ -44,3 +46,12 @@ def test_motions_and_slack_of_the_page(realised):
     slack = {run.run: run.motions.slack["mooring_stern"] for run in realised}
     assert 0.01 < max(slack[run.run] for run in realised[:3]) < 0.2  # at times
     assert 0.6 < slack["regular_1_5"] < 1.0  # mostly
+
+
+@pytest.mark.parametrize("name", ["irregular_1", "regular_1_5", "regular_2"])
+def test_the_share_of_a_slack_line_is_that_of_the_truth(settings, rig, name):
+    load = truth(play_run(settings, name, rig), name, 0.05)["mooring_stern"].values
+    noise = settings.instruments.load_noise * np.random.default_rng(0).normal(size=load.size)
+    found = slack_share(load + noise, noise_floor(load + noise))
+    # Pulses are noise to the noise floor, and loads below it count as slack.
+    assert found == pytest.approx(np.mean(load <= 0), abs=0.07)

@@ -1,6 +1,6 @@
 import pytest
+from said import request_error
 
-from seakeep.errors import RequestError
 from seakeep.tank.settings import default_settings, read_tank
 
 
@@ -45,7 +45,7 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
     }.items(),
 )  # fmt: skip
 def test_bad_settings_say_what_and_how_to_mend(tmp_path, text, message):
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         read(tmp_path, text)
 
 
@@ -56,8 +56,8 @@ def test_a_measured_spectrum_comes_from_a_file(tmp_path):
     )
     assert settings.runs["a"].spectrum.frequencies == (0.3, 0.6, 1.0)
     assert settings.runs["a"].spectrum.densities == (0.001, 0.003, 0.0)
-    with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*none\.csv does not exist"):
+    with request_error(r"runs\.a\.spectrum\.file: .*none\.csv does not exist"):
         read(tmp_path, '[runs.a]\nspectrum = { file = "none.csv" }\n')
     (tmp_path / "odd.csv").write_text("0.3,0.001\n0.6;0.003\n", "utf-8")
-    with pytest.raises(RequestError, match=r"runs\.a\.spectrum\.file: .*Two columns of numbers"):
+    with request_error(r"runs\.a\.spectrum\.file: .*Two columns of numbers"):
         read(tmp_path, '[runs.a]\nspectrum = { file = "odd.csv" }\n')

@@ -187,8 +187,7 @@ def compare(
         bool,
         Option(
             "--baselines",
-            help="Fit hold-last, mean, FIR, ARX and a subspace model to the training runs and "
-            "compare with them.",
+            help="Fit every baseline to the training runs and compare with them.",
         ),
     ] = False,
     nowcast: Annotated[
@@ -239,11 +238,12 @@ def compare(
     check_output(out / DIFFERENCES, "table", used, "run,wave_period,model,.*")
     for path in figures.values():
         check_output(path, "figure", used)
-    if baselines:
-        fitted = _with_baselines(fitted, read)
     if nowcast:
         given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
         refuse(given | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
+    if baselines:
+        fitted = _with_baselines(fitted, read)
+    if nowcast:
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return

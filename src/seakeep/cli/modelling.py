@@ -111,7 +111,7 @@ def tune(
     samples = None if period is None else period / labelled.common_step(runs)
     before = campaign.read_text(encoding="utf-8")
     how = {*vary, *chosen.opened}, preset_of(settings), samples
-    write_text(target, tuned_campaign(before, model, search_result.spec, *how))
+    write_text(target, tuned_campaign(before, model, search_result.settings, *how))
     scores.unlink(missing_ok=True)
     say(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
     if not search_result.table.sizes["trial"]:

@@ -26,10 +26,8 @@ times the data replace one with L times the data, and H is never built.
 
 Only upper triangles are made; what stands below the diagonal is not meaningful.
 
-Coefficients of one delayed regression at many λ or ranks, from its Gram matrix.
-
-A Cholesky factorisation gives those at each λ, :math:`H (C + \lambda I)^{-1}`, and one
-eigendecomposition those of all ranks.
+A Cholesky factorisation of the Gram matrix gives the coefficients at each λ,
+:math:`H (C + \lambda I)^{-1}`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -345,7 +343,7 @@ def factorise(gram: FloatArray, ridge: float) -> FloatArray:
     if failed:
         raise np.linalg.LinAlgError(
             f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
-            "definite. Raise ridge, or use method='svd'."
+            "definite. Raise ridge."
         )
     return factor
 

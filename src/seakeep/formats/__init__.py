@@ -25,7 +25,7 @@ READERS = [
     Reader("MCAP", read_recording, (b"\x89MCAP0\r\n",), (".mcap",)),
     Reader("ROS 2 bag", read_recording, (b"SQLite format 3\0",), (".db3",), "metadata.yaml"),
 ]
-"""Readers of all kinds of files but text; the first one that fits is used."""
+"""Readers of kinds known by their first bytes or suffix; the first one that fits is used."""
 
 TEXT = Reader("text", read_text)
 """Reader of what no other one knows."""

@@ -229,6 +229,7 @@ class Live:
         process = process_noise(errors.residual, self._a, variances)
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
         self._deviations = np.sqrt(np.diagonal(process) + variances)  # after complete samples
+        self._raised = np.where(variances > 0, 1.0, _raised(self._filter, errors))
         self._time = math.nan
         # Samples after an instant whose input is needed before its estimate is final.
         self._ahead = signature.lead_samples
@@ -292,10 +293,15 @@ class Live:
     def covariance(self) -> FloatArray:
         """Covariance of the errors of :attr:`state`, shape (N, N), but for those of lost waves.
 
-        While nothing is measured, the first step of a forecast holds these too.
+        While nothing is measured, the first step of a forecast holds these too. Errors of a model
+        last, which those of the filter do not: they are raised as far as free runs in training err
+        more than by errors that are independent in time, and are never above those of free runs.
         """
         count = len(self.signature.states)
-        return self._filter.covariance[-count:, -count:].copy()
+        known = self._filter.covariance[-count:, -count:]
+        most = self.errors.at(self._count.since) / np.sqrt(np.maximum(np.diagonal(known), TINY))
+        factor = np.minimum(self._raised, most)
+        return known * np.outer(factor, factor)
 
     @property
     def innovation(self) -> FloatArray:
@@ -407,6 +413,7 @@ class Live:
             "d": self._d,
             "offset": self._offset,
             "process": self._filter.process,
+            "raised": self._raised,
             "noise": self._filter.noise,
             "errors": self.errors.rms,
             "centre": scale.centre,
@@ -558,7 +565,8 @@ class Live:
         update = None
         if not is_exact or count.since or at < self._begins:
             self._predict_covariance(at, blind=not (count.partly or seen.any()))
-            deviations = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
+            variances = np.diagonal(self._filter.covariance)[-seen.size :]
+            deviations = np.sqrt(variances + self._noise**2)
             update = _Update(self._filter.measure(seen), deviations)
         self._updates.append(update)
         count.complete = count.complete + 1 if is_exact else 0
@@ -797,7 +805,7 @@ class Live:
             errors = self.errors.of_forecast(count, self._count.since)
             if self._count.partly:
                 own = self.errors.of_forecast(count)
-                errors = np.minimum(own + self._filter.ahead(count), errors)
+                errors = np.minimum(own + self._filter.ahead(count, self._raised), errors)
             given = np.arange(count) <= known - self._ahead
             before = departure(history, scale)
             table[0], spread, weight = weighed(complete, errors, scale, given, before)
@@ -981,6 +989,18 @@ def load_live(model: Servable, path: str | Path) -> Live:
         )
     live._restore(content, dataset["values"].values)
     return live
+
+
+def _raised(known: DelayFilter, errors: LeadErrors) -> FloatArray:
+    """Errors of free runs at the longest lead over those that independent ones add up to.
+
+    Of each state, shape (N,); at least one.
+    """
+    count, process = len(known.a), known.process
+    one = DelayFilter(known.a, process, known.noise, np.zeros_like(known.covariance))
+    one.covariance[-count:, -count:] = process
+    reached = np.diagonal(process) + one.ahead(len(errors.rms) - 1, np.ones(count)).sum(axis=0)
+    return np.sqrt(np.maximum(errors.rms[-1] ** 2 / np.maximum(reached, TINY), 1.0))
 
 
 def held_samples(inside: BoolArray) -> IntArray:

@@ -182,7 +182,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
 
         Returns
         -------
-        HankelDMDcModel
+        HankelDMDcModel or HankelEnsemble
             The model, immutable; its ``settings`` are complete.
 
         Raises
@@ -555,9 +555,9 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         learn from windows have a mean that is worse than that model.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
-    lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, memory, select
+    lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, memory, centre
         As in :class:`HankelDMDc`.
-    centre
+    select
         As in :class:`HankelDMDc`.
     alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,

@@ -191,7 +191,7 @@ class Record:
         Channels by logger, each at its own rate on the reference's time; "" where one file holds
         all.
     clocks : mapping of str to Clock, optional
-        Clock of each logger.
+        Clock of each logger of `groups`.
     span : (float, float), optional
         The part that is used, s.
     waves : str, optional

@@ -30,7 +30,7 @@ from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text
 from seakeep.models.labelled import channel_matrix, check_channels
-from seakeep.models.live import Servable, held_samples
+from seakeep.models.live import SMALL, Servable, held_samples
 from seakeep.models.registry import is_linear
 from seakeep.signals import encounter_period
 from seakeep.signals.time_axis import instant_text, span_text, usual_step
@@ -535,7 +535,7 @@ ATTRIBUTES = {
     "m/s": {"celerity", "alignment_celerity"},
 }  # fmt: skip
 """Attributes of a run, of a forecast or of their channels, by their unit."""
-UNSCALED = {"height", "trained_height", "mean", "trained_mean", "trained_std"}
+UNSCALED = {"height", "trained_height", "mean", "trained_low", "trained_high"}
 """Attributes with a number per input, whose units a forecast does not state."""
 
 
@@ -680,8 +680,6 @@ STARTS = 24
 """Forecasts of a run: enough for a root mean square known to a seventh."""
 PERIODS = 5
 """Longest lead where none is stated, in encounter periods."""
-SHARE = 0.5
-"""Part of the training SD below which the error is to stay, where none is stated."""
 
 
 def nowcasts(
@@ -807,13 +805,13 @@ def nowcast(model: Servable, run: xr.Dataset, steps: int, *, level: float = 0.95
             "error": (over, error, sd),
             "claimed": (over, claimed, sd),
             "coverage": (over, 100.0 * inside / judged, {"units": "%"}),
-            "lead_time": ("channel", signature.dt * held_samples(error <= SHARE), {"units": "s"}),
+            "lead_time": ("channel", signature.dt * held_samples(error <= SMALL), {"units": "s"}),
         },
         coords={
             "lead": ("lead", leads, {"units": "s", "long_name": "lead time"}),
             "channel": list(signature.states),
         },
-        attrs={"share": SHARE, "level": level, "starts": len(starts)},
+        attrs={"share": SMALL, "level": level, "starts": len(starts)},
     )
 
 

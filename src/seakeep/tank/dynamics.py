@@ -51,7 +51,7 @@ class Rig:
 
     `linear` and `quadratic` are the viscous damping of each degree of freedom; `pool` the centre
     of the moon pool (m), quadratic and linear loss of the flow through its opening; `lines` the
-    moorings as in `moorings.line_table`; `step` and `ramp` are in seconds.
+    moorings as in `line_table`; `step` and `ramp` are in seconds.
     """
 
     hydro: Hydrodynamics
