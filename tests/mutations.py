@@ -34,6 +34,7 @@ CHANGES = {
     "campaign/guesses.py": [
         ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
         ("noise_share(series) > 0.5", "noise_share(series) > 2", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
+        ('if "range" not in kinds:', 'if kinds:', "campaign/test_drafts.py::test_guesses"),
         ('"time" in kinds_of(column) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
     ],
     "campaign/pipeline.py": [
@@ -43,6 +44,8 @@ CHANGES = {
         ("time = origin + dt * np.arange(first, last + 1)", "time = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
         ("rtol=1e-6, atol=0), np.nan", "rtol=0, atol=0), np.nan", "campaign/test_prepare.py::test_a_number_for_no_reading_is_a_gap_of_channels_alone"),
         ("in_seconds(own.window, period)", "in_seconds(own.window, 1.0)", "campaign/test_steps.py::test_clocks_from_signals"),
+        ("find(series, time - near,", "find(series, time,", "campaign/test_steps.py::test_clocks_from_signals"),
+        ("find_held(own, step)", "find_held(x, step)", "campaign/test_steps.py::test_a_sensor_that_sticks_is_reported_in_times_that_jitter"),
         ("].reference(logger.time)", "].reading(logger.time)", "campaign/test_steps.py::test_clocks_from_signals"),
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
@@ -101,6 +104,7 @@ CHANGES = {
         ("length + 0.5 * time + 3.0 * mass", "length + 0.5 * time + 2.0 * mass", "signals/test_rigid_body.py::test_froude"),
     ],
     "core/bootstrap.py": [
+        ("np.where(endless, np.fmax", "np.where(~endless, np.fmax", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
         ("(x.size - pieces.size) * zero", "x.size * zero", "statistics/test_bootstrap.py::test_the_lag_one_correlation_is_the_printed_sum_with_its_square"),
         ("bandwidth = min(2 * last, longest)", "bandwidth = min(last, longest)", "statistics/test_bootstrap.py::test_politis_white_agrees_with_arch"),
         ("reshape(len(starts), -1)[:, :size]", "reshape(len(starts), -1)[:, :1]", "statistics/test_two_way.py::test_cells_that_are_not_judged_are_left_out"),
@@ -118,6 +122,7 @@ CHANGES = {
         ("total += 2.0 * correlation", "total += correlation", "statistics/test_calibration.py::test_the_block_is_the_integrated_correlation_time"),
     ],
     "core/coverage.py": [
+        ("np.isnan(between), higher, between", "np.isnan(between), np.inf, between", "statistics/test_coverage.py::test_infinite_values_count_and_nan_does_not"),
         ("2.0 * density - 1.0 / np.sqrt(np.pi)", "density - 1.0 / np.sqrt(np.pi)", "statistics/test_coverage.py::test_the_crps_is_the_integral_that_defines_it"),
         ("mask=lost)", "mask=False)", "statistics/test_coverage.py::test_a_table_by_wave_height_and_horizon_by_hand"),
         ('2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_the_score_of_the_true_band_is_that_of_the_normal_distribution"),
@@ -569,8 +574,15 @@ CHANGES = {
     "signals/synchronisation.py": [
         ("_line(instants + lags.lag[good], instants,", "_line(instants - lags.lag[good], instants,", "campaign/test_steps.py::test_clocks_from_signals"),
         ("offset = level - drift * centre", "offset = level + drift * centre", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
+        (" & (np.abs(lags.lag) < largest_lag)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        ("LARGEST_SCATTER = 1 / 12", "LARGEST_SCATTER = 4.0", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        ("alike < LEAST_SHARED or ", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        (" or abs(rate - 1) > max(LARGEST_DRIFT, 2.0 * drift_error)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
         ("math.sqrt(2) * getattr(clock, key)", "getattr(clock, key)", "signals/test_synchronisation.py::test_windows_that_share_a_half_are_not_counted_twice"),
         ("low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series", "series", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
+    ],
+    "quality/sensors.py": [
+        (' and noise_share(sound(run, name)) <= 0.5', '', "campaign/test_positions.py::test_still_water_and_noise_place_no_probes"),
     ],
     "signals/time_axis.py": [
         ("steps[steps < 1.5 * np.median(steps)].mean()", "np.median(steps)", "signals/test_time_axis.py::test_rounding_of_times_does_not_add_up_over_a_long_gap"),
@@ -608,10 +620,15 @@ CHANGES = {
         ("moving[c, far][m]", "moving[c, False][m]", "study/test_statistics.py::test_a_forecast_that_runs_far_away_moves_no_density_of_another"),
         ("each in zip(moving.items(), rows, strict=True)", "each in zip([*moving.items()][::-1], rows, strict=True)", "study/test_statistics.py::test_divergences_are_those_of_the_joined_windows"),
         ("fitted - offset, total - fitted])", "fitted - offset, total])", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
-        ("blocks=blocks, n_series=DIFFERENCES) - 1.0", "blocks=blocks, n_series=DIFFERENCES)", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
+        ("of_window[k % len(of_window)]", "of_window[0]", "study/test_run.py::test_joined_series_are_the_windows_end_to_end"),
+        ("np.where(lost, np.inf, p)", "p", "study/test_statistics.py::test_forecasts_that_diverge_are_named_and_count_as_infinite"),
+        ("np.isinf(own) & np.isinf(other), 1.0", "np.isinf(own) & np.isinf(other), np.nan", "study/test_statistics.py::test_forecasts_that_diverge_are_named_and_count_as_infinite"),
+        ("cells, **how)) - 1.0", "cells, **how))", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
         ("measured.var(axis=1, ddof=1)", "measured.var(axis=1)", "study/test_response.py::test_the_squares_add_up_to_that_of_the_error"),
     ],
     "study/plan.py": [
+        ("{**known, name: runs[name]}", "runs", "study/test_windows.py::test_an_irregular_run_that_tests_groups_no_regular_ones_that_train"),
+        ("return run not in self.like", "return run in self.left_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
         ("float(span[0]) + test.startup", "float(span[0])", "study/test_windows.py::test_the_start_up_of_a_test_span_is_cut_off"),
         ("step = 1 if drawn else max(width, 1)", "step = 1", "study/test_windows.py::test_training_windows_hold_the_largest_draw_with_its_history"),
         ("list(dict.fromkeys([*firsts.values(), *places]))[:count]", "places[:count]", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),

@@ -53,7 +53,7 @@ class ProbeAlignment:
     ----------
     mode : {"effective", "dispersion"}, optional
         One celerity for all waves, :math:`\eta(t) = \eta_{kn}(t - (x(t) - x_0)/c)` as in the
-        paper, or linear dispersion, frequency by frequency.
+        paper, or linear dispersion, frequency by frequency, which does not hold at forward speed.
     surge : {"measured", "predicted", "none"}, optional
         Position that the elevation is carried to: the measured surge (an output read during the
         forecast, which is then conditional on it), the slow surge that the model itself predicts,
@@ -169,8 +169,7 @@ class ProbeAlignment:
                 f"alignment: surge = 'predicted' needs '{self.surge_channel}' among the states; "
                 f"received {', '.join(states)}. Add it, or choose surge = 'measured' or 'none'."
             )
-        last = slice(None if window is None else -window, None)
-        windows = {name: run.isel(time=last) for name, run in runs.items()}
+        windows = labelled.last_samples(runs, window)
         depth, dt = _common_depth(runs), labelled.run_step(first, first_name)
         celerity = None if self.celerity == "common" else self.celerity
         limit = None

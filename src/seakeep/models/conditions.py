@@ -94,7 +94,8 @@ class Disagreement:
             '{ mode = "dispersion", surge = "none" } in [model] if it has none, or correct the '
             "position",
             "scale": f"{self.channel} moves {self.value:.3g} times as much as in a model of "
-            f"{rest}. Check its calibration, or its sign where it is negative",
+            f"{rest}. If another heading or speed is the cause, fit one model per condition. Else "
+            "check its calibration, or its sign where it is negative",
             "dynamics": f"{place}. Fit one model per condition, and forecast each with its own",
         }[self.reason]
         pair = f"{self.run} disagrees with {rest}"
@@ -131,7 +132,7 @@ def disagreements(
         return []
     spec = spec.having(readouts=(), window=None, memory=0)  # a memory learns offsets of runs
     at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
-    halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
+    halves = labelled.first_halves(runs)
 
     def fitted(names: Iterable[str], settings: Any = spec) -> HankelDMDcModel:
         return settings.fit({name: halves[name] for name in names}, states, inputs)
