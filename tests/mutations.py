@@ -517,7 +517,6 @@ CHANGES = {
     "signals/calculus.py": [
         ("out = np.clip(out, *bounds)", "out = np.clip(out, None, None)", "signals/test_filters.py::test_gaps_have_the_waves_that_are_expected"),
         ("noise = 1e-3 * out.std()", "noise = 0.0 * out.std()", "signals/test_filters.py::test_gaps_have_the_waves_that_are_expected"),
-        ("slopes[[0, 1, -2, -1]] = ends[[0, 1, -2, -1]]", "slopes[[0, 1]] = ends[[0, 1]]", "signals/test_filters.py::test_a_derivative_has_no_more_noise_at_its_ends"),
         ("(own, -known)", "(own, known)", "campaign/test_steps.py::test_an_integral_is_right_beside_a_gap"),
         ("(gain / (1j * omega) ** times)", "(gain / (-1j * omega) ** times)", "signals/test_filters.py::test_integral_of_a_wave_in_the_band"),
         ("(slope / dt if times == 1", "(slope if times == 1", "signals/test_rigid_body.py::test_blend_keeps_slow_motion_and_needs_no_drift_removal"),
@@ -534,7 +533,6 @@ CHANGES = {
         ("return free + ones * (1.0 - free.sum()) / ones.sum()", "return free", "signals/test_carriers.py::test_the_position_follows_a_slow_oscillation_and_holds_at_rest"),
     ],
     "signals/filters.py": [
-        ("(out[::-1], array[::-1])", "(out[::-1], array)", "signals/test_filters.py::test_a_coarser_record_averages_at_its_ends_too"),
         ("0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)", "0.5", "signals/test_time_axis.py::test_what_would_alias_is_removed"),
         ("sum(edges) / 2, window", "edges[1], window", "signals/test_filters.py::test_gains_of_the_taps"),
         ("weights, view[base[rows] + 1]", "weights, view[base[rows]]", "signals/test_time_axis.py::test_tabulated_kernels_are_the_kernels"),

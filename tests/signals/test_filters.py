@@ -16,7 +16,6 @@ from seakeep.signals import (
     integrate,
     low_pass,
     lowpass_taps,
-    resample,
 )
 from seakeep.signals.calculus import expected_in_gaps
 
@@ -77,17 +76,9 @@ def test_gain_of_the_band(frequency, gain):
 
 
 def test_derivative_of_a_quartic_is_exact():
-    # Of a parabola at the ends too; rounding of T⁴ = 4e7 over dt.
+    # Fourth order, at the ends too; rounding of T⁴ = 4e7 over dt.
     t = np.arange(0, 2, 0.1)
-    assert_allclose(differentiate(t**4 - t, 0.1)[2:-2], (4 * t**3 - 1)[2:-2], atol=1e-11)
-    assert_allclose(differentiate(t**2 - t, 0.1), 2 * t - 1, atol=1e-11)
-
-
-def test_a_derivative_has_no_more_noise_at_its_ends():
-    # Rows of weights; inside sqrt(2 (8² + 1)) / 12, and 67 / 12 by a quartic at the ends.
-    noise = np.linalg.norm(differentiate(np.eye(9), 1.0), axis=1)
-    assert_allclose(noise[2:-2], np.sqrt(130) / 12)
-    assert noise.max() < 1.2
+    assert_allclose(differentiate(t**4 - t, 0.1), 4 * t**3 - 1, atol=1e-11)
 
 
 def test_gaps_have_the_waves_that_are_expected():
@@ -109,12 +100,3 @@ def test_envelope_of_a_group():
     # The kernel of the Hilbert transform falls as 1/(π t): a kink at an end, 25 s away, leaks
     # about 1/(π ω t) = 0.002 of its size, twice an amplitude of 1.4, into a square of 2.
     assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)
-
-
-def test_a_coarser_record_averages_at_its_ends_too():
-    # At its end the line through ten samples has (4 n - 2) / (n (n + 1)) = 0.35 of their variance.
-    time = np.arange(400.0)
-    first = resample(np.eye(400), time, time[:391:10])[0]
-    last = resample(np.eye(400), time, time[9::10])[-1]
-    assert_allclose([first @ first, last @ last], 38 / 110, rtol=0.02)
-    assert_allclose([first @ time, last @ time], [0.0, 399.0], atol=0.01)

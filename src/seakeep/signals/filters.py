@@ -71,21 +71,15 @@ def lowpass_taps(
     return taps
 
 
-def odd_extension(array: FloatArray, count: int, over: int = 1) -> FloatArray:
+def odd_extension(array: FloatArray, count: int) -> FloatArray:
     """Lengthen a series at both ends by its point reflections, keeping value and slope there.
 
-    The value at an end is that of the straight line through `over` samples: a filter that is
-    symmetric returns this value there. Series shorter than `count` are continued by their end
-    values beyond the reflection.
+    Series shorter than `count` are continued by their end values beyond the reflection.
     """
     reflected, beside = min(count, array.shape[0] - 1), [(0, 0)] * (array.ndim - 1)
     near = [(reflected, reflected), *beside]
     far = [(count - reflected, count - reflected), *beside]
-    out = np.pad(np.pad(array, near, mode="reflect", reflect_type="odd"), far, mode="edge")
-    line = np.linalg.pinv(np.vander(np.arange(min(over, array.shape[0])), 2))[1]
-    for side, end in ((out, array), (out[::-1], array[::-1])):
-        side[:count] += 2 * (np.tensordot(line, end[: line.size], 1) - end[0])
-    return out
+    return np.pad(np.pad(array, near, mode="reflect", reflect_type="odd"), far, mode="edge")
 
 
 def low_pass(
@@ -175,8 +169,7 @@ def resample(
     -------
     ndarray, shape (new_time,) or (new_time, channel)
         The series at the new instants. Where the instants coincide and the step is the same, the
-        samples are returned untouched. At an end of the series a value rests on the straight line
-        through the last samples of one new step.
+        samples are returned untouched.
 
     Raises
     ------
@@ -244,8 +237,7 @@ def _sinc_sums(
             (x + 1) * x * (x - 1) / 6,
         ]
     )
-    extended = odd_extension(array, half, round(0.5 / edges[1]))
-    columns = extended.reshape(array.shape[0] + 2 * half, -1).T
+    columns = odd_extension(array, half).reshape(array.shape[0] + 2 * half, -1).T
     views = [
         np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(each), 2 * half)
         for each in columns
