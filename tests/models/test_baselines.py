@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
+from said import request_error
 
 from seakeep import SlowSquares
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
-from seakeep.errors import RequestError
 from seakeep.models.selection import select
 
 DT = 0.1
@@ -83,7 +83,7 @@ def test_fir_finds_a_known_impulse_response():
     found = model.coefficients[:, 2:]
     assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
     assert model.spectral_radius == 0.0
-    with pytest.raises(RequestError, match=r"FIR model is a filter of its inputs and has none"):
+    with request_error(r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
 
 

@@ -11,13 +11,13 @@ import pytest
 from drifting import INPUTS, STATES
 from ensembles import few
 from records import record
+from said import data_error, request_error, warned
 
 import seakeep
-from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
-from seakeep.models import KINDS, alignment, outside_training
+from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform
+from seakeep.models import KINDS, InputMap, alignment, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
-from seakeep.models.inputs import InputMap
 
 DT, HEAVE = 0.1, (["heave"], ["eta"])
 
@@ -80,7 +80,7 @@ def test_settings_come_back_from_json(spec):
     back = KINDS[spec.kind].from_json(kept)
     assert back.to_json() == spec.to_json()
     assert back.seed_sequence.state == spec.seed_sequence.state
-    with pytest.raises(RequestError, match=r"unknown key 'rigde'\. Did you mean 'ridge'"):
+    with request_error(r"unknown key 'rigde'\. Did you mean 'ridge'"):
         KINDS[spec.kind].from_json(kept | {"rigde": 1})
 
 
@@ -163,17 +163,17 @@ def test_runs_in_other_units_are_never_pooled():
     plain, centimetres = sea(), sea(seed=1)
     del plain["heave"].attrs["units"]
     centimetres["heave"].attrs["units"] = "cm"
-    with pytest.raises(DataError, match=r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
+    with data_error(r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
         HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], *HEAVE)
 
 
 def test_a_run_that_states_no_unit_is_taken_with_a_warning():
     plain = sea(seed=1)
     del plain["heave"].attrs["units"]
-    with pytest.warns(SeakeepWarning, match=r"'heave' of run 1 states no unit.*in 'm', as in"):
+    with warned(r"'heave' of run 1 states no unit.*in 'm', as in"):
         model = HankelDMDc(1, 4, 1.0).fit([plain, sea()], *HEAVE)
     assert model.state_labels[0].units == "m"
-    with pytest.warns(SeakeepWarning, match=r"'heave' of the run states no unit.*model's 'm'"):
+    with warned(r"'heave' of the run states no unit.*model's 'm'"):
         model.forecast(plain, start=5.0, steps=5)
 
 
@@ -181,7 +181,7 @@ def test_an_observable_that_overflows_is_refused():
     run = sea()
     run["eta"].values[7] = 1e60
     spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
-    with pytest.raises(DataError, match=r"has a standard deviation that is not finite"):
+    with data_error(r"has a standard deviation that is not finite"):
         spec.fit(run, *HEAVE)
 
 

@@ -7,17 +7,11 @@ import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
+from said import data_error, warned
 from scipy import stats
 
 import seakeep
-from seakeep import (
-    BayesianHankelDMDc,
-    DataError,
-    HankelDMDc,
-    LogUniform,
-    SeakeepWarning,
-    Uniform,
-)
+from seakeep import BayesianHankelDMDc, HankelDMDc, LogUniform, Uniform
 from seakeep.models import engine, forecasts
 from seakeep.models.draws import child
 from seakeep.toml import Length
@@ -112,7 +106,7 @@ def test_priors_that_never_fit_are_refused(run):
         r"no feasible draw in 1000: the shortest run has 601 samples up to stop, and the last "
         r"draw asked for \d+ \(window 800, .*\). Give longer runs or a later stop, or narrow"
     )
-    with pytest.raises(DataError, match=text):
+    with data_error(text):
         fitted(run, window="50 T")
 
 
@@ -200,9 +194,7 @@ def test_members_that_diverge_say_when():
     assert_array_equal(summary.status, forecast.status)
     assert summary.attrs["diverged"] == forecast.attrs["diverged"] == lost.sum()
     assert forecast.attrs["status"] == f"{lost.sum()} of 10 members diverged"
-    with pytest.warns(
-        SeakeepWarning, match=r"\d+ of 10 members have a spectral radius of one or mor"
-    ):
+    with warned(r"\d+ of 10 members have a spectral radius of one or mor"):
         radii = ensemble.spectral_radii()
     assert np.all(radii[lost] > 1)
     assert f"({np.sum(radii >= 1)} of 10 UNSTABLE: their long forecasts" in ensemble.summary()

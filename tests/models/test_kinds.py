@@ -11,7 +11,7 @@ from squared import INPUTS, PERIOD, STATES, runs
 
 from seakeep import HankelDMDc, Select, tune
 from seakeep.baselines import ARX, FIR, Subspace
-from seakeep.campaign.settings import ModelSettings
+from seakeep.campaign import ModelSettings
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 

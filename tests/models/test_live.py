@@ -9,17 +9,18 @@ from drifting import FOLLOWED, INPUTS, SQUARES, STATES
 from ensembles import few
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
+from said import request_error
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import seakeep.models.live
-from seakeep import HankelDMDc, Powers, RequestError, load_live
+from seakeep import HankelDMDc, Powers, load_live
 from seakeep.core.kalman import DelayFilter
 from seakeep.models.live import LEAST_RECORD, MOTIONS
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import foresee
-from seakeep.study.comparison import nowcast
+from seakeep.study import nowcast
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
@@ -516,7 +517,7 @@ def test_a_restarted_process_goes_on_bit_for_bit(models, drift, tmp_path, key):
     assert again.consistency == live.consistency
     assert again.conditions.surge == live.conditions.surge
     assert_array_equal(mean(again.forecast(20)), mean(live.forecast(20)))
-    with pytest.raises(RequestError, match="is the state of another model"):
+    with request_error("is the state of another model"):
         load_live(models["lead"], path)
 
 
@@ -554,7 +555,7 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, drift, message):
     assert np.isnan(models["plain"].live().state).all()
     live, untouched = started(models["plain"], drift, 100), started(models["plain"], drift, 100)
     good = {"u": table(drift, INPUTS)[100], "y": table(drift, STATES)[100]}
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         live.step(**good | BAD[message])
     for each in (live, untouched):
         each.step(**good)
@@ -593,9 +594,9 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     change = (moved.surge - still.surge).drop_sel(statistic="std")
     # The ridge moves the answer by a millionth.
     assert_allclose(change, [answer] * 3, rtol=0, atol=1e-5)
-    with pytest.raises(RequestError, match=r"'thrust' is a known input, and future gives 3 of"):
+    with request_error(r"'thrust' is a known input, and future gives 3 of"):
         live.forecast(steps, {"thrust": plan[:3]})
-    with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
+    with request_error("roles names 'eat', which the model does not know"):
         model.live(roles={"eat": "known"})
     # A constant stays; waves that are given count though the other column is not.
     known = u[300:340].copy()

@@ -6,17 +6,10 @@ import pickle
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from said import request_error
 from squared import DT, INPUTS, PERIOD, STATES, runs, sea
 
-from seakeep import (
-    BayesianHankelDMDc,
-    HankelDMDc,
-    LogUniform,
-    ProbeAlignment,
-    RequestError,
-    Select,
-    Uniform,
-)
+from seakeep import BayesianHankelDMDc, HankelDMDc, LogUniform, ProbeAlignment, Select, Uniform
 
 T = PERIOD * DT
 SHORT = Select(observables=True, horizon=10, period=T)
@@ -122,5 +115,5 @@ def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(unknown, m
         return
     assert model.alignment is None
     needed = dataclasses.replace(alignment, optional=False)
-    with pytest.raises(RequestError, match="needs the water depth"):
+    with request_error("needs the water depth"):
         dataclasses.replace(spec, alignment=needed).fit(*given)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from said import warned
 from scipy.signal import lfilter
 
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep import DataError, RequestError
 from seakeep.statistics import block_length, lag_one_correlation, moving_block_bootstrap
 
 
@@ -54,9 +55,9 @@ def test_politis_white_agrees_with_arch(phi):
 
 def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
     slow = np.cos(np.linspace(0, np.pi, 400))
-    with pytest.warns(SeakeepWarning, match=r"rule 'carlstein' asks for blocks of .* cut to 100"):
+    with warned(r"rule 'carlstein' asks for blocks of .* cut to 100"):
         assert block_length(slow) == 100
-    with pytest.warns(SeakeepWarning, match="cut to 60"):  # the shortest segment
+    with warned("cut to 60"):  # the shortest segment
         assert block_length(slow, segments=[140, 60, 200]) == 60
 
 

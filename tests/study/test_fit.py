@@ -14,8 +14,8 @@ from seas import sea
 from small_tank import write_csv
 
 import seakeep
-from seakeep.campaign.store import write_prepared
-from seakeep.errors import SeakeepWarning
+from seakeep import SeakeepWarning
+from seakeep.campaign import write_prepared
 from seakeep.models import KINDS
 from seakeep.study import compare, comparison_table, fit_campaign
 

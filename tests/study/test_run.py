@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
-from seakeep.errors import DataError, RequestError
+from seakeep import DataError, RequestError
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run_study
