@@ -1,5 +1,7 @@
 """Wrong data and wrong requests: each has its own message, and the message says the mend."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,12 +10,12 @@ from said import data_error, request_error, warned
 from seakeep import HankelDMDc
 
 DT = 0.05
-SPEC = HankelDMDc(3, 8, 1.0)
+fit = partial(HankelDMDc(3, 8, 1.0).fit, states=["heave", "pitch"], inputs=["eta_fwd", "eta_cog"])
 
 
 @pytest.fixture
-def model(run, channels):
-    return SPEC.fit(run, **channels)
+def model(run):
+    return fit(run)
 
 
 T = DT * np.arange(400)
@@ -27,21 +29,21 @@ WRONG_TIMES = {
 
 
 @pytest.mark.parametrize("message", WRONG_TIMES)
-def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, channels, message):
+def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, message):
     bad = run.assign_coords(time=WRONG_TIMES[message])
     with data_error(message):
-        SPEC.fit(bad, **channels)
+        fit(bad)
     with data_error(message):
         model.forecast(bad, start=5.0, steps=5)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("name", ["heave", "eta_cog"])
-def test_gaps_in_the_window_are_refused(run, channels, name, value):
+def test_gaps_in_the_window_are_refused(run, name, value):
     run[name][250:253] = value
     message = rf"channel '{name}' of run has 3 missing or infinite value\(s\) .* t = 12\.5 s"
     with data_error(message + r".* gaps up to longest_gap are bridged where"):
-        SPEC.fit(run, **channels)
+        fit(run)
 
 
 def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
@@ -61,10 +63,10 @@ def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
         "timedelta64": np.arange(400).astype("timedelta64[ns]"),
     }.items(),
 )
-def test_a_channel_that_is_not_a_number_is_refused(run, channels, values, kind):
+def test_a_channel_that_is_not_a_number_is_refused(run, values, kind):
     bad = run.assign(heave=("time", values))
     with data_error(f"'heave' of run is of type {kind}.*, not a real number"):
-        SPEC.fit(bad, **channels)
+        fit(bad)
 
 
 ARRAYS = {"x_history": (9, 2), "u_history": (9, 2), "u_future": (19, 2)}
@@ -110,15 +112,15 @@ def test_a_run_that_is_too_short_is_told_how_many_samples_are_missing(
         HankelDMDc(3, 8, 1.0, **settings).fit(short, **channels)
 
 
-def test_the_shortest_run_that_is_long_enough_trains(run, channels):
-    assert SPEC.fit(run.isel(time=slice(0, 10)), **channels).training.columns == (1,)
+def test_the_shortest_run_that_is_long_enough_trains(run):
+    assert fit(run.isel(time=slice(0, 10))).training.columns == (1,)
 
 
-def test_runs_of_another_step_are_refused(model, run, channels):
+def test_runs_of_another_step_are_refused(model, run):
     coarse = run.isel(time=slice(None, None, 2))
     message = r"time step of 0\.1 s and the model one of 0\.05 s\. Resample"
     with data_error(message):
-        SPEC.fit([run, coarse], **channels)
+        fit([run, coarse])
     with data_error(message):
         model.forecast(coarse, start=5.0, steps=5)
 
@@ -129,17 +131,17 @@ def test_a_constant_channel_cannot_be_standardised(run, channels, name, value):
     run[name][:] = value
     message = rf"channel '{name}' is constant \(.*\) over the training window"
     with data_error(message):
-        SPEC.fit(run, **channels)
+        fit(run)
     model = HankelDMDc(3, 8, 1.0, standardize=False).fit(run, **channels)
     assert np.all(np.isfinite(model.forecast(run, start=5.0, steps=20).heave))
 
 
-def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(make_run, channels):
+def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(make_run):
     slack = make_run(seed=1)
     slack.pitch[:] = 0.1
     message = r"channel 'pitch' of run 2 is constant \(0\.1\) .* If its sensor was dead, leave"
     with warned(message):
-        model = SPEC.fit([make_run(), slack], **channels)
+        model = fit([make_run(), slack])
     assert np.all(model.state_std > 0)
 
 
@@ -174,9 +176,9 @@ def test_another_unit_than_trained_is_refused(model, run):
         "has no coordinate 'time' .*sample": {"runs": xr.Dataset({"heave": ("sample", [0.0])})},
     }.items(),
 )
-def test_what_fit_refuses(run, channels, changes, message):
+def test_what_fit_refuses(run, changes, message):
     with request_error(message):
-        SPEC.fit(**{"runs": run, **channels, **changes})
+        fit(**{"runs": run, **changes})
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Baselines: what they are, against other packages and known systems; files; runs of any kind."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     test = linear_run(3)
     # Four states, and one for the constant by which the means of the samples are off.
     change = {"ridge": 0.0, "order": 5} if kind == "subspace" else {}
-    spec = dataclasses.replace(SPECS[kind], **change)
+    spec = replace(SPECS[kind], **change)
     forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
     assert_allclose(table(forecast, STATES), table(test, STATES)[201:501], atol=1e-7)
 
@@ -104,12 +104,12 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
     # What a window leaves out decides nothing.
     other = given[0].copy(deep=True)
     other["heave"][:200] += 1.0
-    window = dataclasses.replace(spec, window=250)
+    window = replace(spec, window=250)
     few = [window.fit(run, STATES, INPUTS) for run in (given[0], other)]
     assert_array_equal(few[0].coefficients, few[1].coefficients)
     # Also where an observable counts in periods of the runs.
     counts, states = (
-        dataclasses.replace(window, observables=(SlowSquares(INPUTS, period=each, lead=0.0),))
+        replace(window, observables=(SlowSquares(INPUTS, period=each, lead=0.0),))
         for each in (None, period)
     )
     models = [each.fit(given, STATES, INPUTS) for each in (counts, states)]

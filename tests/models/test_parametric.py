@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
-from records import record, table
+from records import record, rms, table
 from said import data_error, request_error, warned
 from scipy import signal
 
@@ -49,7 +49,7 @@ def family():
 def error(model):
     """Of a forecast at a draught between those of the family."""
     run = vessel(0.45, 40, 800)
-    return float(np.sqrt(((model.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
+    return rms(model.forecast(run, 5.0, 200).heave - run.heave[51:251])
 
 
 @pytest.fixture(scope="module")

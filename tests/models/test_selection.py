@@ -183,7 +183,7 @@ def test_the_parts_of_a_single_run_are_those_of_its_training_window(history):
     assert "3 parts held out in turn" in of_window.note
     assert of_window.settings.window == window
     scores = [[row["score"] for row in each.rows] for each in (of_window, of_late)]
-    np.testing.assert_allclose(*scores, rtol=1e-9)
+    assert_allclose(*scores, rtol=1e-9)
 
 
 def growing(seed):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
 from said import warned
 from scipy.signal import lfilter
 
@@ -12,7 +13,7 @@ from seakeep.statistics import block_length, lag_one_correlation, moving_block_b
 
 
 def autoregressive(phi, samples, seed):
-    noise = np.random.default_rng(seed).standard_normal(samples + 500)
+    noise = default_rng(seed).standard_normal(samples + 500)
     return lfilter([1.0], [1.0, -phi], noise)[500:]
 
 
@@ -74,8 +75,8 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
 def test_length_and_values_are_kept_and_blocks_run_on(samples, data, n_series, seed):
     length = data.draw(st.integers(1, samples))
     x = np.arange(samples, dtype=float)
-    drawn = moving_block_bootstrap(x, n_series, length, np.random.default_rng(seed))
-    again = moving_block_bootstrap(x, n_series, length, np.random.default_rng(seed))
+    drawn = moving_block_bootstrap(x, n_series, length, default_rng(seed))
+    again = moving_block_bootstrap(x, n_series, length, default_rng(seed))
     assert drawn.shape == (n_series, samples)
     assert np.isin(drawn, x).all()
     assert np.array_equal(drawn, again)
@@ -85,7 +86,7 @@ def test_length_and_values_are_kept_and_blocks_run_on(samples, data, n_series, s
 
 def test_no_block_crosses_a_join_of_segments():
     which = np.repeat([0.0, 1.0, 2.0], [20, 30, 12])
-    drawn = moving_block_bootstrap(which, 200, 12, np.random.default_rng(0), segments=[20, 30, 12])
+    drawn = moving_block_bootstrap(which, 200, 12, default_rng(0), segments=[20, 30, 12])
     blocks = drawn[:, :60].reshape(200, 5, 12)
     assert np.all(blocks == blocks[..., :1])
     assert set(np.unique(blocks)) == {0.0, 1.0, 2.0}
@@ -93,11 +94,11 @@ def test_no_block_crosses_a_join_of_segments():
 
 # --- what is refused -----------------------------------------------------------------------------
 
-NOISE = np.random.default_rng(0).standard_normal(100)
+NOISE = default_rng(0).standard_normal(100)
 
 
 def redrawn(length, segments=None):
-    return moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0), segments=segments)
+    return moving_block_bootstrap(NOISE, 3, length, default_rng(0), segments=segments)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.random import default_rng
 from said import data_error
 
 from seakeep import statistics
@@ -10,7 +11,7 @@ from seakeep.core import bootstrap as core_bootstrap
 from seakeep.core import density as core_divergence
 
 TIME = np.arange(400) / 32
-HEAVE, PITCH = np.random.default_rng(0).standard_normal((2, 400)).cumsum(axis=1)
+HEAVE, PITCH = default_rng(0).standard_normal((2, 400)).cumsum(axis=1)
 MEASURED = xr.Dataset(
     {
         "heave": ("time", HEAVE, {"units": "m"}),
@@ -23,7 +24,7 @@ PREDICTED = 0.9 * MEASURED[["pitch", "heave"]]
 
 
 def redrawn(series, room=statistics):
-    return room.moving_block_bootstrap(series, 5, 20, np.random.default_rng(1))
+    return room.moving_block_bootstrap(series, 5, 20, default_rng(1))
 
 
 def test_a_dataset_is_redrawn_in_step():
@@ -42,9 +43,9 @@ def test_a_dataset_is_redrawn_in_step():
 
 def test_divergence_of_each_channel():
     found = statistics.jsd_interval(
-        PREDICTED, MEASURED, block_length=40, rng=np.random.default_rng(2), n_series=10
+        PREDICTED, MEASURED, block_length=40, rng=default_rng(2), n_series=10
     )
-    children = np.random.default_rng(2).spawn(2)
+    children = default_rng(2).spawn(2)
     assert found["channel"].values.tolist() == ["pitch", "heave"]
     for name, child in zip(["pitch", "heave"], children, strict=True):
         alone = core_divergence.jsd_interval(

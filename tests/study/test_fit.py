@@ -8,6 +8,7 @@ from math import tau
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.random import default_rng
 from said import request_error, warned
 from scipy import signal
 from seas import sea
@@ -27,7 +28,7 @@ RATE = 10.0
 @pytest.fixture
 def halves(tmp_path):
     """One run of 200 s: its first half trains, its second tests."""
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     time = np.arange(2001) / RATE
     eta = np.sin(tau * 0.5 * time + np.sin(time / 9)) + 0.1 * rng.standard_normal(time.size)
     heave = signal.lfilter([0.0, 0.1], [1.0, -1.7, 0.8], eta)
@@ -105,7 +106,7 @@ def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
     ("stated", "taken"), [("", "fir"), ('kind = "hankel_dmdc"\n', "hankel_dmdc")]
 )
 def test_a_filter_that_errs_less_is_taken_where_the_kind_is_left_open(tmp_path, stated, taken):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     runs = ""
     for name in "abcd":  # the waves tell all but the noise, which 41 delayed states learn by heart
         eta, noise = rng.standard_normal((2, 200))
@@ -227,7 +228,7 @@ def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, 
 
 def test_a_run_that_disagrees_with_the_others_is_warned_of(tmp_path):
     sines(tmp_path, dict.fromkeys("abc", (0.7, 0.83, 0.97, 1.13, 1.37, 1.61)))
-    text, rng = "", np.random.default_rng(0)
+    text, rng = "", default_rng(0)
     for name, factor in {"a": 1.0, "b": 1.0, "c": 1.8}.items():
         table = pd.read_csv(tmp_path / f"{name}.csv")
         # Without noise the last state alone tells the next one, and its scale.
