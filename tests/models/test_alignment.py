@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run, heave_error
 from numpy.testing import assert_array_equal
-from records import table
 from said import data_error
 
 from seakeep import HankelDMDc, ProbeAlignment, estimate_probe_offset
@@ -39,15 +38,6 @@ def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models, dr
     assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
     # With no surge and no offset the elevation stays where it is, to a transform's rounding.
     assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
-
-
-def test_a_linear_system_takes_what_the_model_aligned(models, drift):
-    model = models["effective"]
-    now = model.aligned_inputs(drift).isel(time=600)
-    system, state = model.to_state_space(), model.initial_state(drift, 60.0)
-    state = system.A @ state + system.B @ (table(now, INPUTS) - model.input_mean)
-    expected = table(model.forecast(drift, start=60.0, steps=1), STATES)
-    np.testing.assert_allclose(system.C @ state + model.state_mean, expected[0], atol=1e-7)
 
 
 @pytest.mark.parametrize("key", ["effective", "dispersion"])
