@@ -157,6 +157,7 @@ CHANGES = {
         ("part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)", "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
     ],
     "core/kalman.py": [
+        ("on[:, count:] += reach[:, : size - count]", "on[:, :-count] += reach[:, : size - count]", "core/test_kalman.py::test_errors_of_today_are_carried_as_the_model_carries_them"),
         ("+ np.diag(self.noise[rows])", "+ np.diag(self.noise[rows] ** 0.5)", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
         ("= before[count:, count:]", "= before[:-count, :-count]", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
         ("block = top @ self.a.T + self.process", "block = top @ self.a.T", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
@@ -247,10 +248,14 @@ CHANGES = {
         ("np.arange(z, -1, -1)]", "np.arange(z + 1)]", "hosts/test_onnx.py::test_a_horizon_is_that_of_forecast_arrays"),
     ],
     "hosts/templates/estimator.c": [
+        ("k * (1.0 / size)", "(double)k / size", "hosts/test_estimator.py::test_a_record_that_stands_still_or_whose_order_is_half_is_predicted_to"),
         ("if (size > 8 * GAP && (mean", "if ((mean", "hosts/test_estimator.py::test_a_mean_is_judged_over_two_periods_or_more"),
         ("        if (!waves[q])\n            continue;", "", "hosts/test_estimator.py::test_of_an_input_that_is_no_wave_the_mean_alone_is_judged"),
         ("spreads[i] += away * away;", "spreads[i] = away * away;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("row[k] += last[c] * on_states[c * M + k];", "row[k] += 0.0;", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
+    ],
+    "hosts/templates/fmi2.c": [
+        ("fabs(time - state->next)", "(state->next - time)", "hosts/test_fmu.py::test_a_step_that_does_not_follow_on_the_last_is_refused"),
     ],
     "metrics.py": [
         ("own = [_block(p, m) for p, m, _ in cases]", "own = [max(_block(p, m) for p, m, _ in cases)] * len(cases)", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),

@@ -114,7 +114,6 @@ def tune(
     *,
     stop: Stop = None,
     executor: Executor | None = None,
-    seed: int = 0,
     progress: Progress | None = None,
     resume: str | Path | None = None,
 ) -> TuneResult:
@@ -149,8 +148,6 @@ def tune(
         Last instant of the training window of the runs, s.
     executor : concurrent.futures.Executor, optional
         Works on several candidates side by side; the result is the same.
-    seed : int, optional
-        Of the bootstrap of the intervals.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     resume : str or Path, optional
@@ -194,7 +191,6 @@ def tune(
         kinds=RIVALS if "kind" in vary else (),
         executor=executor,
         progress=progress,
-        seed=seed,
         known=known,
     )
     settings, note = found.settings.having(select=None), found.note

@@ -46,9 +46,11 @@ def test_it_is_the_textbook_filter_with_rows_missing():
 
 
 def test_errors_of_today_are_carried_as_the_model_carries_them():
-    found = DelayFilter(A, PROCESS, np.zeros(N), START).ahead(5, np.array([1.0, 3.0]))
-    carried = np.linalg.matrix_power(companion(), 5) * np.resize([1.0, 3.0], SIZE)
-    expected = np.diagonal(carried @ START @ carried.T)[-N:]
+    raised, units = np.array([1.0, 3.0]), np.tile([1.0, 1e9], S + 1)  # m, and a load in N
+    own, start = units[-N:], START * np.outer(units, units)
+    found = DelayFilter(own[:, None] * A / units, PROCESS, np.zeros(N), start).ahead(5, raised)
+    carried = np.linalg.matrix_power(companion(), 5) * np.resize(raised, SIZE)
+    expected = own**2 * np.diagonal(carried @ START @ carried.T)[-N:]
     assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
 
 

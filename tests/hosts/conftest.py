@@ -30,7 +30,7 @@ def sea_run(seed):
     rng = np.random.default_rng(seed)
     eta, probe = rng.standard_normal((2, 402)) * 0.3
     surge = signal.lfilter([0.0, 1.0], [1.0, -1.6, 0.7], (0.3 + probe) * eta)
-    load = np.maximum(2.0, 5.0 + 8.0 * surge) + 0.1 * rng.standard_normal(402)
+    load = 1e8 * (np.maximum(2.0, 5.0 + 8.0 * surge) + 0.1 * rng.standard_normal(402))  # N
     channels = {"eta": eta, "wave probe": probe, "surge": surge, "load": load}
     return record(DT, **{name: values[2:] for name, values in channels.items()})
 

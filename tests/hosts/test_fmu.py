@@ -116,6 +116,16 @@ def test_another_process_goes_on_from_a_state_to_the_last_bit(slave, unpacked, c
     assert_array_equal(found, expected)
 
 
+def test_a_step_that_does_not_follow_on_the_last_is_refused(slave, cases):
+    case = cases["full"]
+    run(slave, case, 0, 3)
+    for start, step in ((2, 1.0), (4, 1.0), (3, 1.001)):
+        with pytest.raises(Exception, match="fmi2DoStep failed with status 3"):
+            slave.doStep(start * case.model.dt, step * case.model.dt)
+    found = run(slave, case, 3, len(case.expected))
+    assert_allclose(found, case.expected[3:], rtol=1e-12, atol=1e-12)
+
+
 def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
     case = cases["full"]
     _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])

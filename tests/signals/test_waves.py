@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.random import default_rng
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from seas import sea
 
 from seakeep.signals import (
@@ -70,8 +70,8 @@ T = 0.02 * np.arange(12_000)
 @given(st.integers(0, 10_000))
 def test_a_record_that_begins_and_ends_in_waves_is_counted_as_the_paper_does(seed):
     x = sea(seed).at(T[:6000])
-    assert encounter_period(x, 0.02) == encounter_period(x, 0.02, still=0.0)
-    assert_array_equal(zero_up_crossings(x, 0.02), zero_up_crossings(x, 0.02, 0, 0))
+    counted = np.count_nonzero(np.diff(np.sign(x - x.mean())) > 0)
+    assert zero_up_crossings(x, 0.02).size == counted
     assert waves_part(x, 0.02) == slice(0, x.size)
 
 
@@ -90,7 +90,6 @@ def test_still_water_around_the_waves_is_not_counted(still, drift, after):
     noise[quiet : quiet + x.size] = 0.0  # what noise does among the waves is another question
     # The first waves may fall to the still part: a few of 140, and the mean moves by as little.
     assert encounter_period(whole + noise, 0.02) == pytest.approx(true, rel=0.01)
-    assert encounter_period(whole + noise, 0.02, still=0.0) != pytest.approx(true, rel=0.05)
     counted = zero_up_crossings(whole + noise, 0.02)
     assert quiet * 0.02 - 0.1 <= counted[0] < quiet * 0.02 + 5
     assert wave_heights(whole + noise, 0.02).size == pytest.approx(T[-1] / true, abs=4)

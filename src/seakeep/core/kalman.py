@@ -106,16 +106,15 @@ class DelayFilter:
 
         Errors of each state are `raised` by a factor, shape (N,).
         """
-        count = len(self.a)
-        out = np.empty((steps, count))
-        values, vectors = linalg.eigh(self.covariance)
-        significant = values > 1e-14 * max(float(values[-1]), TINY)
-        root = vectors[:, significant] * np.sqrt(values[significant])
-        root *= np.resize(raised, len(root))[:, None]
+        count, size = self.a.shape
+        factors = np.resize(raised, size)
+        covariance = self.covariance * np.outer(factors, factors)
+        out, reach = np.empty((steps, count)), self.a  # rows that carry them so far
         for row in out:
-            newest = self.a @ root
-            root = np.concatenate([root[count:], newest])
-            np.einsum("ij,ij->i", newest, newest, out=row)
+            np.einsum("ij,ij->i", reach @ covariance, reach, out=row)
+            on = reach[:, size - count :] @ self.a
+            on[:, count:] += reach[:, : size - count]
+            reach = on
         return out
 
 

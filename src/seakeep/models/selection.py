@@ -707,7 +707,6 @@ def select(
     kinds: Sequence[HankelSettings] = (),
     executor: Executor | None = None,
     progress: Progress | None = None,
-    seed: int = 0,
     known: Known | None = None,
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
@@ -749,8 +748,6 @@ def select(
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
         Called with what is done.
-    seed : int
-        Of the bootstrap of the intervals.
     known : mapping, optional
         Scores and weights by candidate and fold that need not be computed; new ones are added.
 
@@ -812,7 +809,7 @@ def select(
     fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
     return Selected(
         taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
-        tuple(_rows_of(trials.made, taken, level, seed)),
+        tuple(_rows_of(trials.made, taken, level)),
         _note(trials, taken, level, words),
         fitted,
         trials.rival,
@@ -1070,10 +1067,10 @@ def regular_periods(runs: Datasets, inputs: Sequence[str]) -> dict[str, float]:
 
 
 def _rows_of(
-    trials: Mapping[Settings, Trial], taken: Settings, level: float, seed: int
+    trials: Mapping[Settings, Trial], taken: Settings, level: float
 ) -> Iterator[dict[str, Any]]:
     """Rows of the table: windows are drawn again for the interval of each score."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     for candidate, trial in trials.items():
         count = len(trial.weights)
         drawn = rng.integers(count, size=(DRAWS, count))

@@ -52,8 +52,11 @@ STILL = 0.2
 """Running standard deviation, as a part of the waves', below which water counts as still."""
 
 
-def waves_part(series: ArrayLike, dt: float, still: float = STILL) -> slice:
+def waves_part(series: ArrayLike, dt: float) -> slice:
     """Part of a record in which there are waves: still water before and after them is left out.
+
+    Water is still where the standard deviation over two dominant periods is below a fifth of the
+    waves' own.
 
     Parameters
     ----------
@@ -61,9 +64,6 @@ def waves_part(series: ArrayLike, dt: float, still: float = STILL) -> slice:
         Wave elevation, uniformly sampled, without gaps.
     dt : float
         Time step, s.
-    still : float, optional
-        Water is still where the standard deviation over two dominant periods is below this part
-        of the waves' own; 0 keeps the whole record.
 
     Returns
     -------
@@ -82,14 +82,14 @@ def waves_part(series: ArrayLike, dt: float, still: float = STILL) -> slice:
     x = as_series(series)
     length = round(2.0 * _dominant_period(x) + 0.5)
     begin, end = 0, x.size
-    if still <= 0 or x.size < 4 * length:
+    if x.size < 4 * length:
         return slice(begin, end)
     x = x - x.mean()
     sums = [np.concatenate([[0.0], np.cumsum(x**power)]) for power in (1, 2)]
     mean, square = ((each[length:] - each[:-length]) / length for each in sums)
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
     for _ in range(20):
-        moving = np.flatnonzero(spread > still * x[begin:end].std())
+        moving = np.flatnonzero(spread > STILL * x[begin:end].std())
         if not moving.size:
             break
         # The first window that moves holds the waves at its end, the last one at its start.
@@ -201,10 +201,10 @@ def _dominant_period(x: FloatArray) -> float:
     return x.size / max(int(np.argmax(power)), 2)
 
 
-def zero_up_crossings(
-    series: ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
-) -> FloatArray:
+def zero_up_crossings(series: ArrayLike, dt: float, hysteresis: float = 0.0) -> FloatArray:
     """Instants at which a series, less its mean, crosses zero upwards.
+
+    Still water before and after the waves is left out (:func:`waves_part`).
 
     Parameters
     ----------
@@ -216,9 +216,6 @@ def zero_up_crossings(
         A crossing counts if the series was below its mean by this part of its standard deviation
         since the crossing before, and is as much above it before the next one, so that noise on a
         slow wave is not counted. 0 counts every change of sign, as the paper does.
-    still : float, optional
-        Still water before and after the waves is left out (:func:`waves_part`); 0 counts in the
-        whole record. A record without a still start or end gives the same either way.
 
     Returns
     -------
@@ -228,7 +225,7 @@ def zero_up_crossings(
     Raises
     ------
     RequestError
-        If `hysteresis` or `still` is not in 0 to 1.
+        If `hysteresis` is not in 0 to 1.
 
     Examples
     --------
@@ -237,13 +234,12 @@ def zero_up_crossings(
     >>> [round(float(c), 2) for c in zero_up_crossings(-np.cos(2 * np.pi * t / 4), 0.01)]
     [1.0, 5.0, 9.0]
     """
-    for name, value in (("hysteresis", hysteresis), ("still", still)):
-        if not 0 <= number(value, name) < 1:
-            raise RequestError(
-                f"{name} is a fraction of a standard deviation, 0 or more and less than 1; "
-                f"received {value!r}."
-            )
-    part = waves_part(series, dt, still)
+    if not 0 <= number(hysteresis, "hysteresis") < 1:
+        raise RequestError(
+            "hysteresis is a fraction of a standard deviation, 0 or more and less than 1; "
+            f"received {hysteresis!r}."
+        )
+    part = waves_part(series, dt)
     x = as_series(series)[part]
     x = x - x.mean()
     before = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
@@ -257,9 +253,7 @@ def zero_up_crossings(
     return (part.start + first) * time_step(dt)
 
 
-def encounter_period(
-    series: ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
-) -> float:
+def encounter_period(series: ArrayLike, dt: float, hysteresis: float = 0.0) -> float:
     r"""Mean zero-up-crossing period of a wave record.
 
     Parameters
@@ -268,9 +262,8 @@ def encounter_period(
         Wave elevation, uniformly sampled, without gaps.
     dt : float
         Time step, s.
-    hysteresis, still : float, optional
-        As in :func:`zero_up_crossings`: what noise must not pass to be counted, and when water
-        counts as still.
+    hysteresis : float, optional
+        As in :func:`zero_up_crossings`: what noise must not pass to be counted.
 
     Returns
     -------
@@ -282,7 +275,7 @@ def encounter_period(
     DataError
         If the record crosses zero upwards fewer than twice.
     RequestError
-        If `hysteresis` or `still` is not in 0 to 1.
+        If `hysteresis` is not in 0 to 1.
 
     Notes
     -----
@@ -299,7 +292,7 @@ def encounter_period(
     >>> round(encounter_period(np.sin(2 * np.pi * t / 1.64), 0.02), 3)
     1.64
     """
-    crossings = zero_up_crossings(series, dt, hysteresis, still)
+    crossings = zero_up_crossings(series, dt, hysteresis)
     if crossings.size < 2:
         raise DataError(
             f"the record of {np.size(series) * dt:g} s crosses its mean upwards {crossings.size} "

@@ -63,6 +63,7 @@ enum { PLACED = {{ follows.placed | length }}, TAPS = {{ foresight.shape[3] }} }
 #define TRAINED {{ validity.TRAINED | hex }}
 enum { BANDS = {{ coverage.shares.shape[1] }} };
 
+#define PI 3.14159265358979323846
 #define P(i, j) e->covariance[(i) * M + (j)]
 
 /* Inputs so many samples before the newest of the record, or after it. */
@@ -160,34 +161,44 @@ static void measure({{ name }}_estimator *e, const int *rows, int count)
             P(i, OLD + rows[c]) = P(OLD + rows[c], i) = 0.0;
 }
 
-/* Frequency, in cycles of the series, below which half of its variance lies. */
-static double median_frequency(const double *series, int size)
+/* A series about its mean under Hann's taper, whose zeros lie so many samples `beyond` its ends. */
+static void taper(const double *series, int size, int beyond, double *out)
 {
-    const double pi = 3.14159265358979323846;
-    double mean = 0.0, square = 0.0, even = 0.0, grown = 0.0, total = 0.0;
+    double mean = 0.0;
     for (int t = 0; t < size; t++)
         mean += series[t] / size;
-    for (int k = -1; k <= size / 2; k++) {
-        double rate = 2.0 * cos(2.0 * pi * k / size), one = 0.0, two = 0.0;
-        for (int t = 0; t < size; t++) {
-            double x = (series[t] - mean) * (0.5 - 0.5 * cos(2.0 * pi * (t + 1) / (size + 1)));
-            double next = x + rate * one - two;
-            two = one;
-            one = next;
-            if (k < 0) {
-                square += x * x;
-                even += t % 2 ? -x : x;
-                grown += x;
-            }
-        }
-        if (k < 0) { /* by Parseval: half of the sum over the frequencies from zero on */
-            total = 0.25 * (size * square + grown * grown + (size % 2 ? 0.0 : even * even));
-            grown = 0.0;
-            continue;
-        }
-        grown += one * one + two * two - rate * one * two;
+    for (int t = 0; t < size; t++)
+        out[t] = (series[t] - mean) * (0.5 - 0.5 * cos(2.0 * PI * (t + beyond) / (size - 1 + 2 * beyond)));
+}
+
+/* Power of a series at k cycles (Goertzel 1958). */
+static double power(const double *series, int size, int k)
+{
+    double rate = 2.0 * cos(2.0 * PI * k / size), one = 0.0, two = 0.0;
+    for (int t = 0; t < size; t++) {
+        double next = series[t] - two + rate * one;
+        two = one;
+        one = next;
+    }
+    return one * one + two * two - rate * one * two;
+}
+
+/* Frequency, in cycles of the series, below which half of its variance lies. */
+static double median_frequency(const double *series, int size, double *tapered)
+{
+    double square = 0.0, even = 0.0, sum = 0.0, total, grown = 0.0;
+    taper(series, size, 1, tapered);
+    for (int t = 0; t < size; t++) {
+        square += tapered[t] * tapered[t];
+        even += t % 2 ? -tapered[t] : tapered[t];
+        sum += tapered[t];
+    }
+    /* By Parseval: half of the sum over the frequencies from zero on. */
+    total = 0.25 * (size * square + sum * sum + (size % 2 ? 0.0 : even * even));
+    for (int k = 0; k <= size / 2; k++) {
+        grown += power(tapered, size, k);
         if (grown >= total)
-            return (double)k / size;
+            return k * (1.0 / size); /* rounded as in NumPy: orders may lie at halves */
     }
     return 0.5;
 }
@@ -210,7 +221,7 @@ static void identify({{ name }}_estimator *e, int q, int rows)
         square += backward[t] * backward[t];
     }
     if (most > least)
-        order = (int)rint({{ prediction.MEMORY }} / fmax(median_frequency(backward, size), 1.0 / size));
+        order = (int)rint({{ prediction.MEMORY }} / fmax(median_frequency(backward, size, forward), 1.0 / size));
     order = order > size / 3 ? size / 3 : order;
     order = order < 1 ? 1 : order;
     e->mean[q] = mean;
@@ -476,23 +487,6 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
     return 0;
 }
 
-/* Power of a tapered input at each frequency, into `power`; the taper ends `beyond` the record. */
-static void spectrum({{ name }}_estimator *e, int q, double mean, int beyond, double *power)
-{
-    const double pi = 3.14159265358979323846;
-    int size = e->filled;
-    for (int k = 0; k <= size / 2; k++) {
-        double rate = 2.0 * cos(2.0 * pi * k / size), one = 0.0, two = 0.0;
-        for (int t = 0; t < size; t++) {
-            double taper = 0.5 - 0.5 * cos(2.0 * pi * (t + beyond) / (size - 1 + 2 * beyond));
-            double next = (input(e, size - 1 - t)[q] - mean) * taper + rate * one - two;
-            two = one;
-            one = next;
-        }
-        power[k] = one * one + two * two - rate * one * two;
-    }
-}
-
 /* The next row on from this one, forwards or backwards, in which an input was measured. */
 static int measured(const {{ name }}_estimator *e, int row, int by, int q)
 {
@@ -585,18 +579,21 @@ int {{ name }}_validity({{ name }}_estimator *e)
             fourth += away * away / size;
         }
         height = 4.0 * sqrt(fourth / (3.0 * fmax(square, DBL_MIN)));
-        spectrum(e, q, mean, 0, e->forward);
+        for (int t = 0; t < size; t++)
+            e->backward[t] = input(e, size - 1 - t)[q];
+        taper(e->backward, size, 0, e->forward);
         for (int k = 0; k <= size / 2; k++) {
-            sum += e->forward[k];
-            grown += e->forward[k] * k / (size * {{ upper }}_STEP);
+            double here = power(e->forward, size, k);
+            sum += here;
+            grown += here * k / (size * {{ upper }}_STEP);
         }
         grown /= fmax(sum, DBL_MIN);
         steepness = {{ (2 * pi / gravity) | hex }} * height * grown * grown;
-        spectrum(e, q, mean, 1, e->forward);
+        taper(e->backward, size, 1, e->forward);
         for (int k = 1; k <= size / 2; k++) {
             int band = (int)floor({{ validity.PER_OCTAVE }} * log2(k / (size * {{ upper }}_STEP))) - ({{ coverage.first }});
             if (band >= 0 && band < BANDS)
-                energy[band] += e->forward[k];
+                energy[band] += power(e->forward, size, k);
         }
         for (int band = 0; band < BANDS; band++) {
             int beside = taught[band] >= TRAINED || (band > 0 && taught[band - 1] >= TRAINED)

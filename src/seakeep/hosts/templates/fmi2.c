@@ -55,6 +55,7 @@ enum {
 typedef struct {
     char guid[sizeof GUID];
     int started;
+    double next; /* where the next step begins, s; NaN where it may begin anywhere */
     double values[COUNT];
     {{ name }}_{{ "estimator" if ahead else "model" }} model;
 } State;
@@ -80,6 +81,7 @@ static void reset(State *state)
 {
     memset(state, 0, sizeof *state);
     memcpy(state->guid, GUID, sizeof GUID);
+    state->next = NAN;
     memcpy(state->values, start_values, sizeof start_values);
     for (int i = X_HISTORY; i < U_HISTORY; i++)
         state->values[i] = start_values[OUTPUTS + (i - X_HISTORY) % N];
@@ -212,7 +214,9 @@ EXPORT Status FMI(fmi2GetFMUstate)(void *c, void **saved)
 
 EXPORT Status FMI(fmi2SetFMUstate)(void *c, void *saved)
 {
-    memcpy(&((Instance *)c)->state, saved, sizeof(State));
+    State *state = &((Instance *)c)->state;
+    memcpy(state, saved, sizeof(State));
+    state->next = NAN;
     return OK;
 }
 
@@ -295,6 +299,8 @@ EXPORT Status FMI(fmi2DoStep)(void *c, double time, double step, int no_return)
     int status;
     if (!(fabs(step - {{ upper }}_STEP) <= 1e-6 * {{ upper }}_STEP))
         return report(instance, ERROR, "the communication step must be {{ dt }} s");
+    if (fabs(time - state->next) > 0.01 * {{ upper }}_STEP)
+        return report(instance, ERROR, "a step must begin where the last one ended");
 {% if ahead %}
     double *values = state->values, *coming = values + OUTPUTS + N;
     if ({{ name }}_estimate(&state->model, values, values + Q))
@@ -311,6 +317,7 @@ EXPORT Status FMI(fmi2DoStep)(void *c, double time, double step, int no_return)
 {% endif %}
     if (status == 2)
         return report(instance, ERROR, "the run is lost: a state is far beyond its training");
+    state->next = time + step;
     return OK;
 }
 
