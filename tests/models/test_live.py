@@ -460,8 +460,7 @@ def test_skill_against_lead_time_is_that_of_forecasts_by_hand(model, live, drift
         squares = ((mean(forecast) - measured) / spread) ** 2, (std(forecast) / spread) ** 2
         judged.append(np.where(np.isfinite(measured), [*squares, 100.0 * held], np.nan))
     squares, claimed, inside = np.nanmean(judged, axis=0)
-    assert_allclose(found.error, np.sqrt(squares), rtol=1e-12)
-    assert_allclose(found.claimed, np.sqrt(claimed), rtol=1e-12)
+    assert_allclose([found.error, found.claimed], np.sqrt([squares, claimed]), rtol=1e-12)
     assert_array_equal(found.coverage, inside)
 
 

@@ -28,8 +28,7 @@ def remembering(seed, samples=300):
 def test_a_sparse_memory_is_recovered():
     model = SPEC.fit([remembering(1), remembering(2)], ["heave"], ["eta"])
     # Exact data: what is left is rounding times the condition number, below 1e3.
-    assert_allclose(model.A[0], WEIGHTS, rtol=0, atol=1e-10)
-    assert_allclose(model.B[0], [0.7], rtol=0, atol=1e-10)
+    assert_allclose([*model.A[0], *model.B[0]], [*WEIGHTS, 0.7], rtol=0, atol=1e-10)
     run = remembering(7)
     forecast = model.forecast(run, start=5.0, steps=200)
     assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-9)

@@ -77,8 +77,7 @@ def test_a_mat_file_carries_what_idss_asks_for(model, tmp_path):
         *("heave(k)", "pitch(k)", "heave(k-1)"),
         *("pitch(k-3)", "eta_fwd(k-1)", "eta_cog(k-1)"),
     ]
-    assert content["InputName"].tolist() == ["eta_fwd", "eta_cog"]
-    assert content["OutputName"].tolist() == ["heave", "pitch"]
-    assert content["OutputUnit"].tolist() == ["m", "rad"]
+    lists = [content[key].tolist() for key in ("InputName", "OutputName", "OutputUnit")]
+    assert lists == [["eta_fwd", "eta_cog"], ["heave", "pitch"], ["m", "rad"]]
     assert content["Ts"] == model.dt
     assert content["D"].shape == (2, 2)

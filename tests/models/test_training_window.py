@@ -29,8 +29,8 @@ def test_moments_are_those_of_the_windows_pooled_with_ddof_one(make_run, channel
     for names, scale in zip(channels.values(), scales, strict=True):
         pooled = np.concatenate([table(run, names)[-120:] for run in runs])
         # The same sums in the same order, or nearly.
-        assert_allclose(scale.mean, pooled.mean(axis=0), rtol=1e-13)
-        assert_allclose(scale.std, pooled.std(axis=0, ddof=1), rtol=1e-13)
+        expected = pooled.mean(axis=0), pooled.std(axis=0, ddof=1)
+        assert_allclose([scale.mean, scale.std], expected, rtol=1e-13)
 
 
 def test_a_rank_takes_the_place_of_ridge(run, channels):

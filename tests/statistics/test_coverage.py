@@ -34,10 +34,7 @@ def test_a_band_with_gaps_and_a_constant_measurement_give_nan():
     lower = measured - 1
     lower[2, 0] = np.nan
     found = coverage(lower, measured + 1, measured)
-    assert np.isnan(found.inside[0])
-    assert np.isnan(found.width[0])
-    assert found.inside[1] == 1.0
-    assert found.width[1] == 2.0
+    assert_array_equal([found.inside, found.width], [[np.nan, 1.0], [np.nan, 2.0]])
     assert np.isnan(found.relative_width[1])
 
 

@@ -65,9 +65,8 @@ def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks(monke
             assert found.draws[model, draw] == pytest.approx(
                 float(jensenshannon(p, q)) ** 2, rel=1e-4
             )
-    assert found.mean == pytest.approx(found.draws.mean(), rel=1e-14)
-    assert found.lower == pytest.approx(np.quantile(found.draws, 0.025), rel=1e-14)
-    assert found.upper == pytest.approx(np.quantile(found.draws, 0.975), rel=1e-14)
+    expected = found.draws.mean(), *np.quantile(found.draws, [0.025, 0.975])
+    assert (found.mean, found.lower, found.upper) == pytest.approx(expected, rel=1e-14)
     assert found.uncertainty == found.upper - found.lower
 
 
