@@ -99,6 +99,7 @@ CHANGES = {
         ("length + 0.5 * time + 3.0 * mass", "length + 0.5 * time + 2.0 * mass", "signals/test_rigid_body.py::test_froude"),
     ],
     "core/bootstrap.py": [
+        ("np.where(endless, np.fmax", "np.where(~endless, np.fmax", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
         ("(x.size - pieces.size) * zero", "x.size * zero", "statistics/test_bootstrap.py::test_the_lag_one_correlation_is_the_printed_sum_with_its_square"),
         ("bandwidth = min(2 * last, longest)", "bandwidth = min(last, longest)", "statistics/test_bootstrap.py::test_politis_white_agrees_with_arch"),
         ("reshape(len(starts), -1)[:, :size]", "reshape(len(starts), -1)[:, :1]", "statistics/test_two_way.py::test_cells_that_are_not_judged_are_left_out"),
@@ -116,6 +117,7 @@ CHANGES = {
         ("total += 2.0 * correlation", "total += correlation", "statistics/test_calibration.py::test_the_block_is_the_integrated_correlation_time"),
     ],
     "core/coverage.py": [
+        ("np.isnan(between), higher, between", "np.isnan(between), np.inf, between", "statistics/test_coverage.py::test_infinite_values_count_and_nan_does_not"),
         ("2.0 * density - 1.0 / np.sqrt(np.pi)", "density - 1.0 / np.sqrt(np.pi)", "statistics/test_coverage.py::test_the_crps_is_the_integral_that_defines_it"),
         ("mask=lost)", "mask=False)", "statistics/test_coverage.py::test_a_table_by_wave_height_and_horizon_by_hand"),
         ('2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_the_score_of_the_true_band_is_that_of_the_normal_distribution"),
@@ -601,10 +603,15 @@ CHANGES = {
         ("moving[c, far][m]", "moving[c, False][m]", "study/test_statistics.py::test_a_forecast_that_runs_far_away_moves_no_density_of_another"),
         ("each in zip(moving.items(), rows, strict=True)", "each in zip([*moving.items()][::-1], rows, strict=True)", "study/test_statistics.py::test_divergences_are_those_of_the_joined_windows"),
         ("fitted - offset, total - fitted])", "fitted - offset, total])", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
-        ("blocks=blocks, n_series=DIFFERENCES) - 1.0", "blocks=blocks, n_series=DIFFERENCES)", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
+        ("of_window[k % len(of_window)]", "of_window[0]", "study/test_run.py::test_joined_series_are_the_windows_end_to_end"),
+        ("np.where(lost, np.inf, p)", "p", "study/test_statistics.py::test_forecasts_that_diverge_are_named_and_count_as_infinite"),
+        ("np.isinf(own) & np.isinf(other), 1.0", "np.isinf(own) & np.isinf(other), np.nan", "study/test_statistics.py::test_forecasts_that_diverge_are_named_and_count_as_infinite"),
+        ("cells, **how)) - 1.0", "cells, **how))", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
         ("measured.var(axis=1, ddof=1)", "measured.var(axis=1)", "study/test_response.py::test_the_squares_add_up_to_that_of_the_error"),
     ],
     "study/plan.py": [
+        ("{**known, name: runs[name]}", "runs", "study/test_windows.py::test_an_irregular_run_that_tests_groups_no_regular_ones_that_train"),
+        ("return run not in self.like", "return run in self.left_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
         ("float(span[0]) + test.startup", "float(span[0])", "study/test_windows.py::test_the_start_up_of_a_test_span_is_cut_off"),
         ("step = 1 if drawn else max(width, 1)", "step = 1", "study/test_windows.py::test_training_windows_hold_the_largest_draw_with_its_history"),
         ("list(dict.fromkeys([*firsts.values(), *places]))[:count]", "places[:count]", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),

@@ -132,10 +132,12 @@ def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add,
     Own = add("own", models.KINDS)["Own"]
     del DOORS["own"]
     states = ["heave", "pitch"]
-    own = Own(0, 8, ridge=2.0, lead=2).fit(run, states, ["eta_cog"])
-    fir = FIR(8, ridge=2.0, ridge_scale="absolute", lead=2).fit(run, states, ["eta_cog"])
-    # Normal equations of another order.
-    assert_allclose(own.coefficients, fir.coefficients, rtol=0, atol=1e-9)
+    for scale in ("absolute", "per_snapshot"):
+        given = {"ridge": 2.0, "ridge_scale": scale, "lead": 2}
+        own = Own(0, 8, **given).fit(run, states, ["eta_cog"])
+        fir = FIR(8, **given).fit(run, states, ["eta_cog"])
+        # Normal equations of another order.
+        assert_allclose(own.coefficients, fir.coefficients, rtol=0, atol=1e-9)
     put_tutorial(
         tmp_path,
         STUDY.replace(

@@ -289,7 +289,7 @@ def test_lost_forecasts_are_named(result):
     cell = {"model": "m", "test": "unseen", "training": "t0", "window": 1, "run": "r", "start": 2.0}
     lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
     notices = summary(changed(result, {"statistics/lost": lost})).notices
-    (notice,) = (text for text in notices if "diverged and are left out" in text)
+    (notice,) = (text for text in notices if "1 forecast(s) diverged" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
 
 

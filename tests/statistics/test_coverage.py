@@ -117,6 +117,9 @@ def test_boxes_are_matplotlibs_for_any_numbers(values):
     assert_array_equal(ours.outliers, np.sort(theirs["fliers"]))
 
 
-def test_diverged_values_are_left_out_and_counted():
+def test_infinite_values_count_and_nan_does_not():
     box = box_statistics([[1.0, np.nan, 2.0], [np.inf, 3.0, 4.0]])
-    assert (box.count, box.left_out, box.median) == (4, 2, 2.5)
+    assert (box.count, box.left_out) == (5, 1)
+    assert (box.median, box.upper_quartile, box.upper_whisker) == (3.0, 4.0, 4.0)
+    most = box_statistics([np.inf, 1.0, np.inf, np.inf, np.inf])
+    assert (most.lower_whisker, most.lower_quartile, most.median) == (1.0, np.inf, np.inf)

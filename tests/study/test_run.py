@@ -173,12 +173,18 @@ def test_models_that_no_window_judges_are_named(study_folder):
 
 
 def test_joined_series_are_the_windows_end_to_end(finished):
-    test = finished.tests["unseen"]
+    test = finished.tests["unseen"].copy(deep=True)
     predicted, measured, diverged = joined(test, "bayesian")
     assert diverged == 0
     assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
     assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
     assert_array_equal(predicted[1, -1], test["mean"].sel(model="bayesian")[1, -1, -1])
+    # A window that one training set tests has the same forecast in all series.
+    test["judged"][0, 0] = False
+    mean, steps = test["mean"].sel(model="bayesian"), test.sizes["time"]
+    predicted, *_ = joined(test, "bayesian")
+    assert_array_equal(predicted[:, :steps], np.stack([mean[1, 0], mean[1, 0]]))
+    assert_array_equal(predicted[:, steps : 2 * steps], mean[:, 1])
 
 
 OPEN = """

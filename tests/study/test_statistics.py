@@ -171,18 +171,22 @@ ridge_scale = "absolute"
 """
 
 
-def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
+def test_forecasts_that_diverge_are_named_and_count_as_infinite(tmp_path):
     put_tutorial(tmp_path, STUDY.replace("length = 6", "length = 20") + WILD)
     with warned(
-        r"^6 forecast\(s\) diverged and are left out: model 'wild', training set 't00', window 0 "
+        r"^6 forecast\(s\) diverged: model 'wild', training set 't00', window 0 "
         r"of 'unseen' \(unseen from .* and 1 more"
     ):
         found = run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}
     boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
-    assert boxes["count"].sel(model="wild") == 0
-    assert boxes["count"].sel(model="deterministic") == 6
+    assert (boxes["count"] == 6).all()
+    assert np.isinf(boxes["median"].sel(model="wild"))
+    differences = found.groups["statistics/differences"].sel(test="unseen", model="wild")
+    at = differences.sel(measure="nrmse", channel="average")
+    assert np.isinf(at["change"].sel(other="deterministic"))
+    assert at["change"].sel(other="wild") == 0
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
 
 
@@ -217,6 +221,15 @@ def test_differences_between_models_have_intervals_and_verdicts():
     for (model, other), words in pairs.items():
         at = found.sel(model=model, other=other, channel="average")
         assert ratio_of(at).cells()[2] == words
+    # Where few redraws lose more than half of the cells, the bound on that side alone is infinite.
+    test["error"].loc[{"model": "same", "window": slice(3)}] = np.inf
+    found = difference_table(test, TRAINING, rng).sel(measure="nrmse", channel="average")
+    at = found.sel(model="same", other="good")
+    assert 0 < at["lower"] < at["change"] < np.inf == at["upper"]
+    test["error"].loc[{"model": "same"}] = np.inf
+    found = difference_table(test, TRAINING, rng).sel(measure="nrmse", channel="average")
+    assert np.isinf(found["lower"].sel(model="same", other="good"))
+    assert found["upper"].sel(model="good", other="same") == -1.0
     told = [found[key].attrs["long_name"] for key in ("change", "lower", "upper")]
     words = "median error of model over that of other, minus one"
     assert told == [words, f"{words}, lower bound", f"{words}, upper bound"]

@@ -206,6 +206,35 @@ def test_leaving_out_a_sea_state_leaves_out_all_of_its_runs():
     assert not found[0].may_test("b1")
 
 
+def test_a_run_tests_only_where_no_run_of_its_sea_state_trains():
+    runs = {name: recorded(400, sea_state=name[0]) for name in ("a1", "b1", "a2", "c1")}
+    table = settings(training={"scheme": "leave_out", "leave_out": "sea_state"})
+    found = choose_training(table, runs, ["a1", "b1"], NEEDS, ())
+    assert [each.runs for each in found] == [("b1",), ("a1",)]
+    assert left_out(found) == [("a1", "a2"), ("b1",)]
+    judged = [[run for run in runs if each.may_test(run)] for each in found]
+    assert judged == [["a1", "a2", "c1"], ["b1", "c1"]]
+    assert {each.run[0] for each in windows_of(runs, sets=found, windows=3)} == {*"abc"}
+
+
+def test_an_irregular_run_that_tests_groups_no_regular_ones_that_train():
+    runs, rng = {}, np.random.default_rng(0)
+    for name, (period, height) in {
+        "a": (1.5, 1),
+        "b": (2, 1),
+        "high": (1.5, 3),
+        "sea": (1, 0),
+    }.items():
+        run = recorded(400, waves="irregular" if name == "sea" else "regular")
+        waves = height * np.sin(2 * np.pi * run["time"].values / period)
+        waves += (name == "sea") * rng.standard_normal(400)
+        runs[name] = run.assign(eta=("time", waves, {"units": "m"}))
+    table = settings(training={"scheme": "leave_out"})
+    found = choose_training(table, runs, ["a", "b"], NEEDS, ["eta"])
+    assert left_out(found) == [("a", "high"), ("b",)]
+    assert all(each.may_test("sea") for each in found)
+
+
 def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
     """By what the first elevation among the inputs measured, whatever sea states are stated."""
     runs = {}

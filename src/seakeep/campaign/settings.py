@@ -457,7 +457,7 @@ class CampaignSettings(Table):
     rig: RigSettings = RigSettings()
     files: FileSettings = FileSettings()
     channels: dict[ChannelName, ChannelSettings] = Field(
-        min_length=1, description="at least one table [channels.NAME]"
+        min_length=1, description="a table [channels.NAME] per channel, empty where defaults fit"
     )
     derived: dict[ChannelName, DerivedSettings] = Field({})
     instruments: InstrumentsSettings = InstrumentsSettings()

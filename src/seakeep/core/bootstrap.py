@@ -239,7 +239,8 @@ def student_interval(
     draws, k the number of blocks, and t the quantile of Student's distribution (Hesterberg, The
     American Statistician 69, 2015). Quantiles of the draws cover too little for ten blocks or
     fewer. A statistic of which all values are positive is taken in the logarithm, so that its
-    bounds are positive too, unless it is `signed`.
+    bounds are positive too, unless it is `signed`. Where draws are infinite the bounds are the
+    smallest and the largest draw.
 
     Parameters
     ----------
@@ -270,6 +271,9 @@ def student_interval(
     student = special.stdtrit(blocks - 1.0, 0.5 + level / 2)
     half = student * np.sqrt(blocks / (blocks - 1.0)) * spread
     lower, upper = middle - half, middle + half
+    endless = np.isinf(redrawn).any(axis=axis)
+    lower = np.where(endless, np.fmin.reduce(redrawn, axis=axis), lower)
+    upper = np.where(endless, np.fmax.reduce(redrawn, axis=axis), upper)
     return (np.exp(lower), np.exp(upper)) if positive else (lower, upper)
 
 
@@ -366,7 +370,7 @@ def two_way_interval(
     Returns
     -------
     lower, upper : ndarray, shape (…)
-        Bounds; NaN where an axis of several cells holds fewer than three
+        Bounds; NaN where an axis of several cells, judged or not, holds fewer than three
         blocks, which say nothing of their spread. An axis of one cell is not redrawn: the
         interval is then conditional on it.
 

@@ -285,6 +285,9 @@ def _parts(shape: tuple[int, ...], heights: FloatArray | None) -> dict[str, Bool
     return out
 
 
+QUARTILES = 0.25, 0.5, 0.75
+
+
 @dataclass(frozen=True)
 class BoxStatistics:
     """The numbers that a box plot draws.
@@ -302,7 +305,7 @@ class BoxStatistics:
     count : int
         Values judged.
     left_out : int
-        Values that were NaN or infinite (a forecast that diverged).
+        Values that were NaN.
     """
 
     lower_quartile: float
@@ -322,7 +325,8 @@ def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
     Parameters
     ----------
     values : array_like
-        Numbers in any shape; those that are not finite are left out and counted.
+        Numbers in any shape; NaN is left out and counted. Infinite ones, such as the error of a
+        forecast that diverged, are values like others.
 
     Returns
     -------
@@ -331,7 +335,7 @@ def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
     Raises
     ------
     DataError
-        If no value is finite.
+        If all values are NaN.
 
     Examples
     --------
@@ -340,14 +344,16 @@ def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
     (3.5, 5.0, array([20.]))
     """
     everything = as_real(values, "values").ravel()
-    x = np.sort(everything[np.isfinite(everything)])
+    x = np.sort(everything[~np.isnan(everything)])
     if x.size == 0:
-        raise DataError(f"none of {everything.size} value(s) is finite; there is no box to draw.")
-    first, middle, third = (float(item) for item in np.quantile(x, [0.25, 0.5, 0.75]))
+        raise DataError(f"all {everything.size} value(s) are NaN; there is no box to draw.")
+    with undefined():  # beside an infinite value
+        between, higher = (np.quantile(x, QUARTILES, method=m) for m in ("linear", "higher"))
+    first, middle, third = np.where(np.isnan(between), higher, between).tolist()
     room = 1.5 * (third - first)
     # A whisker never ends inside the box, also where no value lies between it and the fence.
-    low = min(float(x[x >= first - room][0]), first)
-    high = max(float(x[x <= third + room][-1]), third)
+    low = min(float(x[~(x < first - room)][0]), first)
+    high = max(float(x[~(x > third + room)][-1]), third)
     return BoxStatistics(
         lower_quartile=first,
         median=middle,

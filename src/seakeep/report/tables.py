@@ -136,15 +136,15 @@ def shade(text: str) -> int:
 
 
 def number(value: SupportsFloat, digits: int = 3) -> Number:
-    """Text of a number; a dash for one that is not finite.
+    """Text of a number; a dash for NaN.
 
     Examples
     --------
-    >>> number(-0.0004), number(-0.4), number(float("nan"))
-    ('0.000', '-0.400', '–')
+    >>> number(-0.0004), number(-0.4), number(float("inf")), number(float("nan"))
+    ('0.000', '-0.400', 'inf', '–')
     """
     value = float(value)
-    return Number(f"{value:z.{digits}f}") if np.isfinite(value) else MISSING
+    return MISSING if np.isnan(value) else Number(f"{value:z.{digits}f}")
 
 
 def numbers(values: npt.ArrayLike, digits: int = 3) -> list[Number]:
@@ -164,7 +164,7 @@ def reach(values: npt.ArrayLike, digits: int = 0) -> str:
 
 
 def short(value: SupportsFloat, digits: int = 4) -> Number:
-    """Text of a number of four significant digits; a dash for one that is not finite.
+    """Text of a number of four significant digits; a dash for NaN.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def short(value: SupportsFloat, digits: int = 4) -> Number:
     ('2255', '0.01', '–')
     """
     value = float(value)
-    return Number(f"{value:.{digits}g}") if np.isfinite(value) else MISSING
+    return MISSING if np.isnan(value) else Number(f"{value:.{digits}g}")
 
 
 shorter = partial(short, digits=3)

@@ -59,15 +59,17 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
     Returns
     -------
     Dataset
-        ``mean``; ``error`` over (measure, window, channel), NaN where a channel is not judged or
-        the forecast is lost; ``error_over_time`` over (band, window, time), and over (band, window,
-        channel) the mean of a channel's ε(t), ``level``, and ``growth``: its change over the window
-        along the line of least squares.
+        ``mean``; ``error`` over (measure, window, channel), NaN where a channel is not judged and
+        infinite where the forecast diverged; ``error_over_time`` over (band, window, time), and
+        over (band, window, channel) the mean of a channel's ε(t), ``level``, and ``growth``: its
+        change over the window along the line of least squares.
     """
     both = paired(**pair)
     p, m, spread, judged = both
-    size = root_mean_square(p - m)
-    errors = [size / spread, extremes_error(both), size / np.asarray(pair["training_std"])]
+    lost = np.isnan(p).any(axis=(-2, -1), keepdims=True)
+    endless = both._replace(p=np.where(lost, np.inf, p))
+    size = root_mean_square(endless.p - m)
+    errors = [size / spread, extremes_error(endless), size / np.asarray(pair["training_std"])]
     parts = np.stack([p - m, *split_bands(p - m, dt, frequency)])
     absolute = np.abs(parts) / spread[..., None, :]
     age = np.linspace(-0.5, 0.5, p.shape[-2])
@@ -119,7 +121,7 @@ def judge(
 
 
 def lost_forecasts(groups: Datasets, tests: Iterable[str]) -> xr.Dataset | None:
-    """Cells without a whole forecast, which are left out; of ensembles, all members were lost."""
+    """Cells without a whole forecast; of ensembles, all members were lost."""
     rows = []
     for name in tests:
         test = groups[f"tests/{name}"]
@@ -155,8 +157,9 @@ def words_of_lost(lost: xr.Dataset) -> str:
     ]
     more = f"; and {len(cells) - SHOWN} more, in statistics/lost" if len(cells) > SHOWN else ""
     return (
-        f"{len(cells)} forecast(s) diverged and are left out: {'; '.join(named)}{more}. A larger "
-        "ridge, fewer delays or more training data make a model stable."
+        f"{len(cells)} forecast(s) diverged: {'; '.join(named)}{more}. Their errors count as "
+        "infinite in medians, quartiles and differences; all else leaves them out. A larger ridge, "
+        "fewer delays or more training data make a model stable."
     )
 
 
@@ -173,7 +176,8 @@ def difference_table(
     """Change of the median error from one model to another, with its interval.
 
     ``change`` over (model, other, measure, channel) is the median error over all cells over that of
-    the other model, minus one: −0.2 is better by 20 %. ``lower`` and ``upper`` come from a two-way
+    the other model, minus one: −0.2 is better by 20 %; models that both diverge in more than half
+    of the cells are alike. ``lower`` and ``upper`` come from a two-way
     block bootstrap over training sets and test windows
     (:func:`seakeep.statistics.two_way_interval`); ``blocks`` of each that overlap are drawn
     together. Where the interval holds zero the study cannot tell.
@@ -185,8 +189,9 @@ def difference_table(
 
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
+        own, other = middle[:, :, None], middle[:, None]
         with undefined():
-            return middle[:, :, None] / middle[:, None]
+            return np.log(np.where(np.isinf(own) & np.isinf(other), 1.0, own / other))
 
     coords = {
         "model": test["model"].values,
@@ -194,7 +199,8 @@ def difference_table(
         "measure": test["measure"].values,
         "channel": _names(test),
     }
-    values = with_bounds(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES) - 1.0
+    how = {"rng": rng, "blocks": blocks, "n_series": DIFFERENCES, "signed": True}
+    values = np.exp(with_bounds(ratio, cells, **how)) - 1.0
     out = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
     for key, words in {"change": "", "lower": ", lower bound", "upper": ", upper bound"}.items():
         out[key].attrs["long_name"] = f"median error of model over that of other, minus one{words}"
@@ -216,7 +222,7 @@ def _names(test: xr.Dataset) -> list[str]:
 
 
 def average_of(cells: FloatArray) -> FloatArray:
-    """Average of cells (…, channel) over the judged channels; NaN where a forecast diverged."""
+    """Average of cells (…, channel) over the judged channels."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
         return np.nanmean(cells, axis=-1)
@@ -251,7 +257,7 @@ def training_order(training: xr.Dataset) -> tuple[IntArray, int]:
 def median_of(cells: FloatArray) -> FloatArray:
     """Median along the second axis, NaN left out: a tenth of the time of ``nanmedian``."""
     ordered = np.sort(cells, axis=1)  # NaN last, and first where there is nothing else
-    count = np.isfinite(ordered).sum(axis=1, keepdims=True)
+    count = (~np.isnan(ordered)).sum(axis=1, keepdims=True)
     low, high = np.maximum(count - 1, 0) // 2, count // 2
     pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=1), axis=1)
     return pair.mean(axis=1)
@@ -402,15 +408,15 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     """Forecasts of the windows of a test set joined end to end, and the measurement.
 
-    Forecasts have the shape (series, time, channel): one series per training set that may test all
-    windows; where none may (runs are left out), the k-th series takes each window's k-th training
-    set. A series in which a forecast diverged is left out; their number comes last.
+    Forecasts have the shape (series, time, channel): the k-th series takes each window's k-th
+    training set, from the first again where a window has fewer. A series in which a forecast
+    diverged is left out; their number comes last.
     """
-    judged = test["judged"].values
+    sets = [np.flatnonzero(of_window) for of_window in test["judged"].values.T]
     mean = test["mean"].sel(model=model).values
-    count = int(judged.sum(axis=0).min())
-    rows = np.argsort(~judged, axis=0, kind="stable")[:count]
-    picked = mean[rows, np.arange(judged.shape[1])].reshape(count, -1, mean.shape[-1])
+    count = max(map(len, sets))
+    rows = [[of_window[k % len(of_window)] for of_window in sets] for k in range(count)]
+    picked = mean[rows, np.arange(len(sets))].reshape(count, -1, mean.shape[-1])
     whole = np.isfinite(picked).all(axis=(1, 2))
     measured = test["measured"].values.reshape(-1, mean.shape[-1])
     return picked[whole], measured, int(np.count_nonzero(~whole))

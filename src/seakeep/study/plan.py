@@ -18,7 +18,7 @@ from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Needs, Spec
 from seakeep.models.selection import groups_of
-from seakeep.models.settings import periods_to_samples
+from seakeep.models.settings import Folds, periods_to_samples
 from seakeep.models.validity import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
@@ -39,15 +39,19 @@ class TrainingSet:
         Run, first instant that may be read, and stop, s.
     left_out : tuple of str
         Runs that only test; empty where training and test lie in different spans.
+    like : tuple of str
+        Runs that may not test: those that train, and those of their groups; empty where training
+        and test lie in different spans.
     """
 
     name: str
     spans: tuple[Span, ...]
     left_out: tuple[str, ...] = ()
+    like: tuple[str, ...] = ()
 
     def may_test(self, run: str) -> bool:
         """Whether a run may test what was learnt here."""
-        return not self.left_out or run in self.left_out or run not in self.runs
+        return run not in self.like
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -115,6 +119,23 @@ def parts_of(runs: Datasets, spans: Iterable[Span]) -> Groups:
     return {name: between(runs[name], (min(ends), max(ends))) for name, ends in edges.items()}
 
 
+def left_out_together(
+    runs: Datasets, names: Sequence[str], folds: Folds, inputs: Sequence[str]
+) -> list[list[str]]:
+    """Groups of training runs that are left out together, each with the other runs like them.
+
+    Other runs are compared one by one: an irregular run does not decide how regular ones that
+    train are grouped.
+    """
+    known = {name: runs[name] for name in names}
+    of_run = groups_of(known, folds, inputs)
+    for name in runs.keys() - known.keys():
+        each = groups_of({**known, name: runs[name]}, folds, inputs)
+        of_run.update((name, of_run[n]) for n in names if each[n] == each[name])
+    groups = dict.fromkeys(of_run.values())
+    return [[name for name in runs if of_run.get(name) == group] for group in groups]
+
+
 def choose_training(
     settings: StudySettings,
     runs: Datasets,
@@ -124,11 +145,9 @@ def choose_training(
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
     training = settings.training
-    groups = defaultdict(list)
+    groups: list[list[str]] = []
     if training.scheme == "leave_out":
-        of_run = groups_of({n: runs[n] for n in names}, training.leave_out, inputs)
-        for name, group in of_run.items():
-            groups[group].append(name)
+        groups = left_out_together(runs, names, training.leave_out, inputs)
         if len(groups) < 2:
             what = training.leave_out.replace("_", " ")
             what = "run with its repetitions" if what == "auto" else what
@@ -166,8 +185,9 @@ def choose_training(
                 f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
                 tuple(whole[name] for name in names if name not in group),
                 tuple(group),
+                tuple(name for other in groups if other is not group for name in other),
             )
-            for group in groups.values()
+            for group in groups
         )
     if training.scheme == "pooled":
         return (TrainingSet("pooled", tuple(whole.values())),)
@@ -406,13 +426,6 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
         )
         for name, test in settings.tests.items()
     }
-    for name, windows in tests.items():
-        for window in windows:
-            if not any(each.may_test(window.run) for each in training):
-                raise RequestError(
-                    f"tests.{name}: no model may be tested on the run '{window.run}', because all "
-                    "learn from it. Leave it out of training.runs, or name other runs."
-                )
     tested = {window.run for windows in tests.values() for window in windows}
     untested = [
         each.name

@@ -33,7 +33,7 @@ from seakeep.study.judge import average_of
 
 FEWEST = 10
 """Values from which on a density is drawn; of fewer, points and box alone."""
-HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\")
+HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\", "....", "||||", "++++")
 """Of the boxes of one model after the other."""
 JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
 """Sideways places of the single values; the same in every figure."""
@@ -129,7 +129,8 @@ def _draw_boxes(
     axes.grid(axis="x", visible=False)
     if logarithmic:
         every = np.concatenate([each for of_model in columns.values() for each in of_model])
-        low, high = 0.8 * every[every > 0].min(), 1.25 * np.nanmax(every)
+        every = every[np.isfinite(every) & (every > 0)]
+        low, high = 0.8 * every.min(), 1.25 * every.max()
         axes.set_ylim(low, high)
         if high < 100.0 * low:
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -148,7 +148,8 @@ def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any
     def cell(training: int, window: int) -> dict[str, Any]:
         models = {}
         for model, (errors, parts) in series.items():
-            nrmse = [round(float(e), 3) if e == e else None for e in errors[training, window]]
+            rounded = errors[training, window].round(3).tolist()
+            nrmse = [e if np.isfinite(e) else None for e in rounded]
             own = {key: packed(values[training, window]) for key, values in parts.items()}
             models[model] = {**own, "nrmse": nrmse}
         name, start = (data[key].values[window] for key in ("run", "start"))

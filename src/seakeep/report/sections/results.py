@@ -391,7 +391,7 @@ def error_table(result: StudyResult, test: str) -> Table:
         more += (
             f" {lost} values were left out: a channel whose measured SD is below 1 % of its "
             "training SD (a slack line), or more than half of whose variance is noise, is not "
-            "judged, nor is a forecast that diverged."
+            "judged."
         )
     count = int(result.tests[test]["judged"].sum())
     return by_channel(result, "errors", columns, more, test, count=count)
