@@ -56,6 +56,7 @@ def test_a_forecast_upstream_says_how_far_ahead_it_reads(drifts, drift):
     [
         few(seed=np.random.default_rng(3), lead="0.5 T", ridge=2.0),
         BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
+        BayesianHankelDMDc.recommended(1.6),
     ],
 )
 def test_settings_come_back_from_json(spec):
