@@ -32,6 +32,7 @@ CHANGES = {
     "campaign/guesses.py": [
         ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
         ("noise_share(series) > 0.5", "noise_share(series) > 2", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
+        ('if "range" not in kinds:', 'if kinds:', "campaign/test_drafts.py::test_guesses"),
         ('"time" in kinds_of(column) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
     ],
     "campaign/pipeline.py": [
@@ -41,6 +42,8 @@ CHANGES = {
         ("time = origin + dt * np.arange(first, last + 1)", "time = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
         ("rtol=1e-6, atol=0), np.nan", "rtol=0, atol=0), np.nan", "campaign/test_prepare.py::test_a_number_for_no_reading_is_a_gap_of_channels_alone"),
         ("in_seconds(own.window, period)", "in_seconds(own.window, 1.0)", "campaign/test_steps.py::test_clocks_from_signals"),
+        ("find(series, time - near,", "find(series, time,", "campaign/test_steps.py::test_clocks_from_signals"),
+        ("find_held(own, step)", "find_held(x, step)", "campaign/test_steps.py::test_a_sensor_that_sticks_is_reported_in_times_that_jitter"),
         ("].reference(logger.time)", "].reading(logger.time)", "campaign/test_steps.py::test_clocks_from_signals"),
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
@@ -564,8 +567,15 @@ CHANGES = {
     "signals/synchronisation.py": [
         ("_line(instants + lags.lag[good], instants,", "_line(instants - lags.lag[good], instants,", "campaign/test_steps.py::test_clocks_from_signals"),
         ("offset = level - drift * centre", "offset = level + drift * centre", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
+        (" & (np.abs(lags.lag) < largest_lag)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        ("LARGEST_SCATTER = 1 / 12", "LARGEST_SCATTER = 4.0", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        ("alike < LEAST_SHARED or ", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
+        (" or abs(rate - 1) > max(LARGEST_DRIFT, 2.0 * drift_error)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
         ("math.sqrt(2) * getattr(clock, key)", "getattr(clock, key)", "signals/test_synchronisation.py::test_windows_that_share_a_half_are_not_counted_twice"),
         ("low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series", "series", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
+    ],
+    "quality/sensors.py": [
+        (' and noise_share(sound(run, name)) <= 0.5', '', "campaign/test_positions.py::test_still_water_and_noise_place_no_probes"),
     ],
     "signals/time_axis.py": [
         ("steps[steps < 1.5 * np.median(steps)].mean()", "np.median(steps)", "signals/test_time_axis.py::test_rounding_of_times_does_not_add_up_over_a_long_gap"),

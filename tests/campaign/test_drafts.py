@@ -37,6 +37,7 @@ GUESSES = {
         ("Heave", "deg"): "heave_signal",
         ("WP_1", "m"): "eta_1",
         ("eta cog", None): "eta_cog",
+        ("WaveRadar Bow range", "m"): "wave_radar_bow_range",
         ("probe", "cm"): "eta_1",
         ("probe", "V"): "probe",
         ("Tension_SB", "N"): "mooring_starboard",
@@ -56,7 +57,11 @@ GUESSES = {
         ("odd flags", None): "odd_flags_signal",
         ("°", None): "channel",
     },
-    "wave_probes": {("us_fwd", "mm"): "eta_us_fwd", ("carriage", "V"): "carriage"},
+    "wave_probes": {
+        ("us_fwd", "mm"): "eta_us_fwd",
+        ("air gap", "m"): "air_gap",
+        ("carriage", "V"): "carriage",
+    },
     "mru": {("us_fwd", "mm"): "us_fwd", ("rate_x", "deg/s"): "roll_rate"},
 }
 """Channels by logger, column and unit."""

@@ -63,6 +63,16 @@ def test_a_wrong_position_is_warned_of_once_and_is_a_finding_of_every_run(campai
         ]
 
 
+def test_still_water_and_noise_place_no_probes(campaign, tmp_path):
+    path, rng = tmp_path / "two.csv", np.random.default_rng(0)
+    time = np.arange(0, 90, 0.05)
+    still = {f"{probe} [m]": 1e-3 * rng.standard_normal(time.size) for probe in PLACES}
+    write_csv(path, {"time [s]": time, **still})
+    for waves in ("still", "irregular"):
+        run = campaign(-400.0, waves).prepare(["two"])["two"]
+        assert not [each for each in findings_of(run) if each.kind.word == "position"]
+
+
 def test_a_probe_in_another_unit_is_kept_until_its_file_is_repaired(campaign, tmp_path):
     sound, path = campaign(48.42), tmp_path / "two.csv"
     text = path.read_text("utf-8")

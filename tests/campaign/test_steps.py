@@ -11,6 +11,7 @@ from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep import read_campaign
+from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 
 AXES, G = ("surge", "sway", "heave"), 9.81
@@ -206,6 +207,7 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     # A parabola through three samples of a sine of 26 samples a period: some 1e-3 of a step.
     run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0")
     assert run.attrs["celerity"] == pytest.approx(2.0, rel=1e-3)
+    assert run.attrs["celerity_correlation"] == pytest.approx(1.0, abs=1e-3)
     # The start-up is used by none: what lies before the spans decides nothing.
     spans = "train = [61, 90]\ntest = [90, 119]"
     run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0", spans)
@@ -213,11 +215,21 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     assert "celerity" not in two_probes(tmp_path, "eta_a = 4.0\neta_b = 4.0").attrs
 
 
+def test_a_sensor_that_sticks_is_reported_in_times_that_jitter(tmp_path):
+    t, rng = np.arange(0, 120, 0.05), np.random.default_rng(0)
+    x = 0.05 * np.sin(2 * np.pi * 0.38 * t)
+    x[1000:1040] = x[1000]
+    text = "[channels.eta_a]\n[preparation]\njitter = 'interpolate'\nsampling_rate = 10\n"
+    run = prepared(tmp_path, {"eta_a [m]": x}, text, t + 6e-4 * rng.uniform(-1, 1, t.size))
+    (stuck,) = [each for each in findings_of(run) if each.kind.word == "stuck"]
+    assert stuck.details["samples"] == 40
+
+
 WANDER = sea(5, (0.2, 1.0)).at  # without a period of its own, so that a lag is unique
 
 
 @pytest.mark.parametrize("way", ["shared", "correlated"])
-@pytest.mark.parametrize(("offset", "drift"), [(0.731, 0.0), (-1.204, 60e-6)])
+@pytest.mark.parametrize(("offset", "drift"), [(7200.731, 0.0), (-1.204, 60e-6)])
 def test_clocks_from_signals(tmp_path, way, offset, drift):
     """A camera of 30 Hz beside a logger of 100 Hz: one signal in both, or two that go together."""
     rng = np.random.default_rng(1)
@@ -232,9 +244,10 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
         "time [s]": seen, "heave [mm]": 50 * other + 2 * rng.standard_normal(seen.size),
     })  # fmt: skip
     path = tmp_path / "campaign.toml"
+    near = "offset = 7200\n" if offset > 7200 else ""
     path.write_text(
         "[channels.draught]\n[channels.heave]\n[instruments]\nreference = 'loads'\n"
-        f"[instruments.loads]\n[instruments.camera]\n{way} = ['heave', 'draught']\n"
+        f"[instruments.loads]\n[instruments.camera]\n{way} = ['heave', 'draught']\n{near}"
         "[preparation]\nsampling_rate = 20\n[runs.r]\nspan = [5, 185]\n[runs.r.files]\n"
         "loads = 'loads.csv'\ncamera = 'camera.csv'\n"
     )

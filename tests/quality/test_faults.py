@@ -39,7 +39,7 @@ def noisy():
 
 
 def recorded(x):
-    group = flag_samples(record(DT, heave=x), PreparationSettings())
+    group = flag_samples(record(DT, heave=x), PreparationSettings(), {})
     return Record("r", group, {"": group})
 
 

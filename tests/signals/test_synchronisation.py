@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
+from seakeep.errors import DataError
 from seakeep.signals import (
     Clock,
     clock_from_correlation,
@@ -85,6 +86,24 @@ def test_windows_that_share_a_half_are_not_counted_twice():
         misses.append((clock.drift - 20e-6) / clock.drift_error)
     # The root mean square of 25 is 1 ± 0.14.
     assert abs(np.sqrt(np.mean(np.square(misses))) - 1) < 0.42
+
+
+@pytest.mark.parametrize(
+    ("find", "offset", "drift", "other"),
+    [
+        (clock_from_correlation, 40.0, 0.0, 0.0),  # windows at wrong lags scatter
+        (clock_from_correlation, 5.05, 0.0, 0.0),  # 0.98 at the last lag, 0.05 s off
+        (clock_from_shared, 0.3, 3e-3, 0.0),  # no clock drifts so
+        (clock_from_shared, 0.3, 0.0, 1.0),  # two signals that only go together
+    ],
+)
+def test_what_is_no_clock_is_refused(find, offset, drift, other):
+    def signal(t):
+        return waves(0)(t) + other * waves(1)(t)
+
+    ours = logger(signal, 20.0, 200.0, 0.0, 0, offset, drift)
+    with pytest.raises(DataError, match="largest_lag"):
+        find(*ours, *logger(waves(0), 20.0, 200.0, 0.0, 0), 20.0, 5.0)
 
 
 def test_pulses_down_lost_and_doubled():

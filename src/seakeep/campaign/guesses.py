@@ -416,13 +416,17 @@ def _listed(files: Files) -> str:
 
 
 def _channels(column: str, dimension: str | None, logger: str) -> Iterator[str]:
-    """Canonical channels that words, unit and logger may mean, the likeliest first."""
+    """Canonical channels that words, unit and logger may mean, the likeliest first.
+
+    A range to the waves is no elevation: it has the other sign, and the vessel's own motion.
+    """
     words, kinds = words_of(column), kinds_of(column)
     numbers = [word for word in words if word.isdigit()]
-    if "wave" in kinds:
-        yield "eta_" + ("_".join([w for w in words if w in CALLED["place"]] + numbers) or "1")
-    if dimension == "m" and "wave" in kinds_of(logger):
-        yield "eta_" + "_".join(words)
+    if "range" not in kinds:
+        if "wave" in kinds:
+            yield "eta_" + ("_".join([w for w in words if w in CALLED["place"]] + numbers) or "1")
+        if dimension == "m" and "wave" in kinds_of(logger):
+            yield "eta_" + "_".join(words)
     yield from motions_of(column)
     if "load" in kinds and set(words).isdisjoint(chain(*CALLED["motion"].values())):
         ends = [CALLED["ends"][word] for word in words if word in CALLED["ends"]]

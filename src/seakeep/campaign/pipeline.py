@@ -229,6 +229,7 @@ def sync(run: Run) -> Run:
 
 def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
     own, period = run.settings.instruments[logger.name], run.period
+    near = own.offset or 0.0
     if own.trigger is not None:
         theirs = run.settings.instruments[reference.name].trigger
         if theirs is None:
@@ -237,21 +238,21 @@ def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
                 f"trigger = 'COLUMN' to [instruments.{reference.name}]."
             )
         return clock_from_pulses(
-            logger.column(own.trigger), logger.time, reference.column(theirs), reference.time,
-            own.offset or 0.0,
+            logger.column(own.trigger), logger.time, reference.column(theirs), reference.time, near
         )  # fmt: skip
     pair = own.shared or own.correlated
     if not pair:
         stated = own.offset is not None or own.drift is not None
         method = "as stated" if stated else ASSUMED
-        return Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0), method=method)
+        return Clock(near, 1e-6 * (own.drift or 0.0), method=method)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])
     if not np.ptp(series) or not np.ptp(other):
         raise DataError(f"'{pair[0]}' or '{pair[1]}' is constant. Choose signals that move.")
     find = clock_from_shared if own.shared else clock_from_correlation
     window, largest_lag = in_seconds(own.window, period), in_seconds(own.largest_lag, period)
-    return find(series, time, other, instants, window, largest_lag)
+    clock = find(series, time - near, other, instants, window, largest_lag)
+    return replace(clock, offset=near + clock.offset)
 
 
 def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
@@ -360,8 +361,8 @@ def cleaned(run: Run) -> Run:
         logger = run.loggers[key]
         if preparation.gaps == "refuse":
             _refuse_gaps(data, run.name, logger.path)
-        data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
-        groups[key] = data = flag_samples(data, preparation)
+        data, read = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
+        groups[key] = data = flag_samples(data, preparation, read)
         if logger.options.sampling_rate and logger.options.time is None:
             step = time_step_of(logger.columns, time_column(logger.columns))
             if step:  # the step of the file's times, where a stated rate is used
@@ -395,12 +396,14 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
     )
 
 
-def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:
-    """Put the channels on a uniform axis, where that is allowed."""
+def _regular(
+    data: xr.Dataset, preparation: PreparationSettings, name: str
+) -> tuple[xr.Dataset, dict[str, FloatArray]]:
+    """Put channels on a uniform axis, where that is allowed; and what was read, if it differs."""
     time = data["time"].values
     try:
         uniform_step(time, name)
-        return data
+        return data, {}
     except DataError as error:
         report, mend = inspect_times(time, name), ""
         if report.gaps and preparation.gaps == "refuse":
@@ -411,19 +414,27 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
             raise DataError(f"{error} Or state {mend} in [preparation].") from None
     series = np.column_stack([each.values for each in data.values()])
     new, values = onto_uniform(time, series, name)
-    variables = {
-        str(n): ("time", values[:, i], each.attrs) for i, (n, each) in enumerate(data.items())
-    }
+    read = np.full_like(values, np.nan)
+    read[report.place] = series
     done = {
         "time_gaps": len(report.gaps),
         "time_missing": report.missing,
         "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
     }
-    return xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
+
+    names = [str(name) for name in data]
+    variables = {n: ("time", x, data[n].attrs) for n, x in zip(names, values.T, strict=True)}
+    uniform = xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
+    return uniform, dict(zip(names, read.T, strict=True))
 
 
-def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
-    """Fill gaps, so that filters can run, and flag what was filled and what looks wrong."""
+def flag_samples(
+    data: xr.Dataset, preparation: PreparationSettings, read: Mapping[str, FloatArray]
+) -> xr.Dataset:
+    """Fill gaps, so that filters can run, and flag what was filled and what looks wrong.
+
+    Interpolation makes equal readings differ: whether a sensor is stuck is judged by what was read.
+    """
     step = usual_step(data["time"].values)
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
@@ -436,13 +447,15 @@ def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Datas
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
         if x.size >= 16 and np.ptp(x):
-            if np.isfinite(reading := reading_step(x)):
+            own = read.get(str(name), x)
+            own = np.where(np.isfinite(own), own, x)
+            if np.isfinite(reading := reading_step(own)):
                 known["reading_step"] = reading
             there = flags == 0
-            stuck = find_held(x, step) & there
+            stuck = find_held(own, step) & there
             for start, end in stretches(stuck):  # what stands before a gap that was filled
                 stuck[start:end] = end - start > 2
-            outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
+            outlier, edge = find_outliers(x) & there & ~stuck, saturated(own, stuck)
             flags[outlier] |= OUTLIER
             flags[edge] |= SATURATED
             flags[stuck & ~edge] |= STUCK
@@ -682,15 +695,16 @@ def _part(
     raise RequestError(f"{lacks}. Lengthen the span, or move it into the run's {common}.")
 
 
-def celerity_of(run: Run, dt: float) -> float | None:
-    """Effective celerity of the waves in the part of a run that is used, m/s; None if unknown."""
+def celerity_of(run: Run, dt: float) -> dict[str, float]:
+    """Effective celerity of the waves in the part of a run that is used, m/s; and correlation."""
     channels, rig = run.settings.celerity_channels, run.settings.rig
     if channels is None or rig.water_depth is None:
-        return None
+        return {}
     apart = rig.positions[channels[1]] - rig.positions[channels[0]]
     try:
         used = inside(run.data["time"].values, run.used_span, dt)
         first, last = (run.data[name].values[used] for name in channels)
-        return effective_celerity(first, last, dt, apart, rig.water_depth).celerity
+        found = effective_celerity(first, last, dt, apart, rig.water_depth)
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
-        return None
+        return {}
+    return {"celerity": found.celerity, "celerity_correlation": found.correlation}

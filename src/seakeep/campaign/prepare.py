@@ -481,7 +481,7 @@ class Campaign:
             "frame": rig.frame,
             "encounter_period": general.encounter_period,
             "probe_offset": settings.probe_offset,
-            "celerity": celerity_of(run, dt),
+            **celerity_of(run, dt),
         }
         whole = (time[0], time[-1])
         for use in ("train", "test"):

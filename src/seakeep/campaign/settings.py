@@ -55,7 +55,8 @@ class RigSettings(Table):
     """``[rig]``: the basin and where things stand in it."""
 
     water_depth: Annotated[float, AfterValidator(_depth)] | None = optional(
-        "water depth in metres; inf, without quotes, for deep water"
+        "water depth in metres; inf, without quotes, for deep water; left out at forward speed, "
+        "where linear dispersion does not hold"
     )
     wave_direction: Finite | None = optional(
         "direction in which the waves run, degrees from the x axis"
@@ -167,7 +168,10 @@ class InstrumentSettings(TimesSettings):
     )
     window: Duration = optional("length of correlation windows, s or periods", 20.0)
     largest_lag: Duration = optional("lags searched on either side, s or periods", 5.0)
-    offset: Finite | None = optional("reading of its clock at reference time 0, s")
+    offset: Finite | None = optional(
+        "reading of its clock at reference time 0, s; beside trigger, shared or correlated, near "
+        "which it is searched"
+    )
     drift: Finite | None = optional("drift of its clock, ppm")
     metres_per_pixel: Positive | None = optional("of a camera, in the vessel's plane")
     panel: Pair | None = optional("[length, height] of the panel that a camera tracks, m")

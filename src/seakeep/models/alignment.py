@@ -53,7 +53,7 @@ class ProbeAlignment:
     ----------
     mode : {"effective", "dispersion"}, optional
         One celerity for all waves, :math:`\eta(t) = \eta_{kn}(t - (x(t) - x_0)/c)` as in the
-        paper, or linear dispersion, frequency by frequency.
+        paper, or linear dispersion, frequency by frequency, which does not hold at forward speed.
     surge : {"measured", "predicted", "none"}, optional
         Position that the elevation is carried to: the measured surge (an output read during the
         forecast, which is then conditional on it), the slow surge that the model itself predicts,

@@ -94,7 +94,8 @@ class Disagreement:
             '{ mode = "dispersion", surge = "none" } in [model] if it has none, or correct the '
             "position",
             "scale": f"{self.channel} moves {self.value:.3g} times as much as in a model of "
-            f"{rest}. Check its calibration, or its sign where it is negative",
+            f"{rest}. If another heading or speed is the cause, fit one model per condition. Else "
+            "check its calibration, or its sign where it is negative",
             "dynamics": f"{place}. Fit one model per condition, and forecast each with its own",
         }[self.reason]
         pair = f"{self.run} disagrees with {rest}"

@@ -49,7 +49,8 @@ class SamplesKind(Kind):
     WAVES = (
         "shows waves of {value:.3g} and {period:.3g} s: no sea and no basin has them (heights are "
         "1/20 000 to 1/7 of the length in deep water)",
-        "Check unit in [channels.{channel}], and the unit of the times (time_unit in [files]).",
+        "Check unit in [channels.{channel}], and the unit of the times (time_unit in [files]). A "
+        "ship at speed in head waves meets them so fast that they may be right.",
         True,
     )
     STATED_PERIOD = (

@@ -13,8 +13,17 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, as_series
-from seakeep.quality.faults import STUCK, find_held
-from seakeep.quality.findings import Findings, Kind, Record, Redundant, channels_of, filled, step_of
+from seakeep.quality.faults import STUCK, find_held, noise_share
+from seakeep.quality.findings import (
+    Findings,
+    Kind,
+    Record,
+    Redundant,
+    channels_of,
+    filled,
+    sound,
+    step_of,
+)
 from seakeep.signals import misplaced_probes
 from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.waves import dominant_period
@@ -45,7 +54,8 @@ class SensorsKind(Kind):
         "is stated to stand {limit:+.3f} from {other}, and the phases of the waves fit "
         "{value:+.3f} (± {spread:.3f} m){unsure}; an elevation carried by the stated distance is "
         "wrong by {error:.2f} of its standard deviation",
-        "Check [rig.positions] of the campaign, the water depth and the probes' clocks.",
+        "Check [rig.positions] of the campaign, the water depth and the probes' clocks. At forward "
+        "speed dispersion does not hold: leave water_depth out of [rig].",
     )
 
 
@@ -130,15 +140,15 @@ def _faults(agreement: Agreement, unit: str) -> Iterator[tuple[SensorsKind, floa
 def positions(record: Record) -> Findings:
     """Stated positions of wave probes against the phases of the waves that passed them.
 
-    Nothing can be said without a water depth, nor of regular waves.
+    Nothing can be said without a water depth, nor of regular waves, still water and noise.
     """
     run, depth = record.whole, record.water_depth
     places = {
         name: channel.attrs["x_position"]
         for name, channel in channels_of(run).items()
-        if "x_position" in channel.attrs
+        if "x_position" in channel.attrs and noise_share(sound(run, name)) <= 0.5
     }
-    if depth is None or record.waves == "regular" or len(places) < 2:
+    if depth is None or record.waves in ("regular", "still") or len(places) < 2:
         return
     series = {name: filled(run[name]) for name in places}
     for each in misplaced_probes(series, places, step_of(run), depth):

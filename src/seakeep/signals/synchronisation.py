@@ -18,14 +18,31 @@ from seakeep.errors import DataError, RequestError
 from seakeep.signals.filters import low_pass
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import Clock, record, stretches, uniform_step, usual_step
-from seakeep.signals.waves import noise_level, tapered_power
+from seakeep.signals.waves import dominant_period, noise_level, tapered_power
 
 LARGEST_DRIFT = 1e-3
-"""Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
+"""Drift of a clock that is believed: a thousand ppm."""
+
+LARGEST_SCATTER = 1 / 12
+"""Scatter of the lags of windows about a line, in periods of the waves, that is believed. Related
+signals stay below half of it; windows that are compared at wrong lags exceed three times it."""
+
+LEAST_SHARED = 0.8
+"""Correlation of a signal in the records of two loggers, once their clocks agree, that is believed:
+noise of three quarters of its SD."""
 
 SIGNAL, ABOVE = 0.99, 20.0
 """Part of the squared slope of a signal, which tells instants, that is compared where two loggers
 record it, and the power over that of its noise from which on it counts."""
+
+_OFFSET = (
+    "state as offset (s) about what the logger's clock reads when the reference's reads 0 (of a "
+    "campaign: in [instruments.NAME])"
+)
+_LAGS = (
+    " Where the clocks differ by more than largest_lag ({:g} s), raise it, or "
+    f"{_OFFSET}; in regular waves, keep it below half a period."
+)
 
 
 def _line(own: FloatArray, reference: FloatArray, errors: FloatArray, method: str) -> Clock:
@@ -173,9 +190,9 @@ def clock_from_correlation(
     Raises
     ------
     DataError
-        If fewer than two windows correlate.
+        If fewer than two windows correlate, or their lags are not those of one clock.
     RequestError
-        If a record is shorter than the window.
+        If what the records share is shorter than the window and twice the largest lag.
     """
     a, c = record(series, time, "the logger")
     b, t = record(reference, reference_time, "the reference")
@@ -183,27 +200,30 @@ def clock_from_correlation(
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
         raise RequestError(
-            f"the records share {end - begin:g} s, and a window of {window:g} s with lags of "
-            f"±{largest_lag:g} s needs {window + 2 * largest_lag:g} s. Shorten window or "
-            "largest_lag (of a campaign: in [instruments.NAME])."
+            f"the clock of the logger runs from {c[0]:.1f} to {c[-1]:.1f} s and the reference's "
+            f"from {t[0]:.1f} to {t[-1]:.1f} s. They share {max(end - begin, 0.0):g} s, and a "
+            f"window of {window:g} s with lags of ±{largest_lag:g} s needs "
+            f"{window + 2 * largest_lag:g} s. Shorten window or largest_lag; or {_OFFSET}."
         )
     grid = begin + step * np.arange(int((end - begin) / step + 1e-9) + 1)
-    lags = windowed_lags(
-        CubicSpline(c, a)(grid),
-        CubicSpline(t, b)(grid),
-        step,
-        window,
-        largest_lag,
-    )
-    good = lags.correlation >= least_correlation
+    other = CubicSpline(t, b)(grid)
+    lags = windowed_lags(CubicSpline(c, a)(grid), other, step, window, largest_lag)
+    # The highest correlation at an end of the lags is no peak.
+    good = (lags.correlation >= least_correlation) & (np.abs(lags.lag) < largest_lag)
     if good.sum() < 2:
         raise DataError(
             f"{int(good.sum())} of {good.size} windows correlate by {least_correlation:g} or more: "
-            "the two signals do not go together. Choose other channels, another window, or a "
-            "larger lag."
+            "the two signals do not go together. Choose other channels, or another window."
+            + _LAGS.format(largest_lag)
         )
     instants = begin + lags.centre[good]
     clock = _line(instants + lags.lag[good], instants, 0 * instants, "correlation of windows")
+    period = dominant_period(other, step)
+    if clock.residual > LARGEST_SCATTER * period:
+        raise DataError(
+            f"the lags of {clock.count} windows scatter by {clock.residual:.2g} s, in waves of "
+            f"{period:.2g} s: they are not those of one clock." + _LAGS.format(largest_lag)
+        )
     # Neighbours share a half, so that two windows count as one.
     errors = {key: math.sqrt(2) * getattr(clock, key) for key in ("offset_error", "drift_error")}
     return replace(clock, **errors)
@@ -236,7 +256,7 @@ def clock_from_shared(
     Raises
     ------
     DataError, RequestError
-        As :func:`clock_from_correlation`.
+        As :func:`clock_from_correlation`; a DataError too if the signals differ.
     """
     first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
     a, c = record(series, time, "the logger")
@@ -264,6 +284,7 @@ def clock_from_shared(
         offset, rate = float(offset + shift - stretch * centre), float(rate + stretch)
         if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
             break
+    alike = math.sqrt(max(1.0 - float(left.var() / a[inside].var()), 0.0))
     # Samples of a residual that goes with the slope, as both are waves, count less than once each.
     lags = min(round(window / usual_step(c)), left.size // 2)
     together = np.prod([autocorrelation([x[:, None]], lags) for x in (left, slope)], axis=0)[:, 0]
@@ -272,6 +293,12 @@ def clock_from_shared(
     rms = float(np.sqrt(left @ left / left.size) / (abs(gain) * np.std(slope) + 1e-300))
     if turned:
         offset, rate = -offset / rate, 1 / rate
+    if alike < LEAST_SHARED or abs(rate - 1) > max(LARGEST_DRIFT, 2.0 * drift_error):
+        raise DataError(
+            f"at their best fit, with a drift of {1e6 * (rate - 1):+.0f} ppm, the two records "
+            f"correlate by {alike:.2f}: no clock drifts so, or they share no signal."
+            + _LAGS.format(largest_lag)
+        )
     offset_error = float(np.hypot(level_error, centre * drift_error))
     return Clock(
         offset, rate - 1, offset_error, drift_error, "shared channel", left.size, rms, centre=centre

@@ -221,9 +221,8 @@ def _tolerance(t: FloatArray, step: float) -> float:
 
 
 def _irregularity(t: FloatArray, name: str) -> str:
-    steps = np.diff(t)
-    place, step, _ = _grid(t)
-    counts = np.diff(place)
+    steps, report = np.diff(t), inspect_times(t, name)
+    step, counts = report.step, np.diff(report.place)
     gaps = np.flatnonzero(counts > 1)
     if gaps.size and np.max(np.abs(steps / step - counts)) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
@@ -250,6 +249,8 @@ class TimeReport:
     ----------
     step : float
         Step of the grid that fits the instants best, s.
+    begin : float
+        First instant of that grid, s.
     count : int
         Instants that are there.
     missing : int
@@ -260,6 +261,8 @@ class TimeReport:
         Distance of the instants from the grid, s.
     jittered : bool
         Whether that is more than a hundredth of a step and than the decimals explain.
+    place : ndarray of int
+        Instant of the grid that each stands for.
 
     Examples
     --------
@@ -268,11 +271,13 @@ class TimeReport:
     """
 
     step: float
+    begin: float
     count: int
     missing: int
     gaps: tuple[tuple[float, float], ...]
     jitter_rms: float
     jittered: bool
+    place: IntArray
 
     @property
     def uniform(self) -> bool:
@@ -301,27 +306,23 @@ def inspect_times(time: ArrayLike, name: str = "the run") -> TimeReport:
         If the times are not finite, repeated or unsorted.
     """
     t = check_order(time, name)
-    place, step, begin = _grid(t)
+    steps = np.diff(t)
+    # Rounding of the times averages out; in one step it would add up over a long gap.
+    usual = steps[steps < 1.5 * np.median(steps)].mean()
+    place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / usual), 1))]).astype(int)
+    step, begin = np.polyfit(place, t, 1)
     away = t - (begin + step * place)
     at = np.flatnonzero(np.diff(place) > 1)
     return TimeReport(
-        step=step,
+        step=float(step),
+        begin=float(begin),
         count=t.size,
         missing=int(place[-1]) + 1 - t.size,
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
         jitter_rms=math.sqrt(np.mean(away**2)),
         jittered=bool(np.abs(away).max() > _tolerance(t, step)),
+        place=place,
     )
-
-
-def _grid(t: FloatArray) -> tuple[IntArray, float, float]:
-    """Whole number of steps from the first instant to each, the step, and the grid's start."""
-    steps = np.diff(t)
-    # Rounding of the times averages out; in one step it would add up over a long gap.
-    usual = steps[steps < 1.5 * np.median(steps)].mean()
-    place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / usual), 1))])
-    step, begin = np.polyfit(place, t, 1)
-    return place.astype(np.int64), float(step), float(begin)
 
 
 def onto_uniform(
@@ -363,9 +364,9 @@ def onto_uniform(
             f"{name} misses {report.missing} samples and has {t.size}: its times do not make a "
             "record. Split the file where the logger paused, or state its sampling rate."
         )
-    place, step, begin = _grid(t)
+    place = report.place
     out = np.full((place[-1] + 1, *x.shape[1:]), np.nan)
-    grid = begin + step * np.arange(out.shape[0])
+    grid = report.begin + report.step * np.arange(out.shape[0])
     out[place] = x
     if report.uniform:
         return t.copy(), out
