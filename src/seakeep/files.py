@@ -96,6 +96,11 @@ def read_bytes(path: Path | str) -> bytes:
         return place.read_bytes()
 
 
+def digest_of(content: object) -> str:
+    """SHA-256 of JSON values, in hexadecimal digits, whatever the order of their keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file's content, in hexadecimal digits.
 

@@ -1,7 +1,6 @@
 """The campaign: runs as measured, and as models take them."""
 
 import hashlib
-import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,7 +17,7 @@ from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettin
 from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import cross_checks, span_mistakes
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
-from seakeep.files import expanded, version
+from seakeep.files import digest_of, expanded, version
 from seakeep.quality import as_json, judge_runs, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.time_axis import inside
@@ -111,7 +110,7 @@ class Campaign:
             content["campaign"]["period_channel"] = self.period_channel()
         content["celerity_channels"] = self.settings.celerity_channels
         content["format"] = FORMAT
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return digest_of(content)
 
     @property
     def _measures_period(self) -> bool:

@@ -169,8 +169,7 @@ class ProbeAlignment:
                 f"alignment: surge = 'predicted' needs '{self.surge_channel}' among the states; "
                 f"received {', '.join(states)}. Add it, or choose surge = 'measured' or 'none'."
             )
-        last = slice(None if window is None else -window, None)
-        windows = {name: run.isel(time=last) for name, run in runs.items()}
+        windows = labelled.last_samples(runs, window)
         depth, dt = _common_depth(runs), labelled.run_step(first, first_name)
         celerity = None if self.celerity == "common" else self.celerity
         limit = None

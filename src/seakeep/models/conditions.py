@@ -132,7 +132,7 @@ def disagreements(
         return []
     spec = spec.having(readouts=(), window=None, memory=0)  # a memory learns offsets of runs
     at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
-    halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
+    halves = labelled.first_halves(runs)
 
     def fitted(names: Iterable[str], settings: Any = spec) -> HankelDMDcModel:
         return settings.fit({name: halves[name] for name in names}, states, inputs)

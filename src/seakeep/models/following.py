@@ -96,8 +96,7 @@ class Following:
         DataError
             If a run is shorter than eight encounter periods.
         """
-        last = slice(None if window is None else -window, None)
-        windows = {name: run.isel(time=last) for name, run in runs.items()}
+        windows = labelled.last_samples(runs, window)
         names = [each for each, yes in zip(alignment.inputs, alignment.carried, strict=True) if yes]
         first_name, first = next(iter(windows.items()))
         dt, period = labelled.run_step(first, first_name), labelled.mean_period(windows, names)

@@ -352,6 +352,17 @@ def wave_channel(run: xr.Dataset, inputs: Sequence[str], name: str) -> str | Non
     return next(iter([*filter(is_elevation, inputs), *lengths]), None)
 
 
+def last_samples(runs: Datasets, window: int | None) -> Groups:
+    """The last samples of each run, `window` of them; None keeps all."""
+    last = slice(None if window is None else -window, None)
+    return {name: run.isel(time=last) for name, run in runs.items()}
+
+
+def first_halves(runs: Datasets) -> Groups:
+    """The first half of each run."""
+    return {name: run.isel(time=slice(run.sizes["time"] // 2)) for name, run in runs.items()}
+
+
 def mean_period(runs: Datasets, inputs: Sequence[str]) -> float:
     """Mean encounter period of some runs, samples: as they state it, or counted.
 

@@ -444,7 +444,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         values = {name: parameter_of(run, self.parameter, name) for name, run in runs.items()}
         inner = sorted(set(values.values()))[1:-1]
         steps = round(HORIZON * labelled.mean_period(runs, inputs))
-        halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
+        halves = labelled.first_halves(runs)
         folds = [
             ({n: runs[n] for n in runs if values[n] != out}, [n for n in runs if values[n] == out])
             for out in inner

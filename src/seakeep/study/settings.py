@@ -7,8 +7,6 @@ deterministic model and the ensemble, all of them with the same windows and the 
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +18,7 @@ from seakeep.campaign import Campaign, read_campaign
 from seakeep.campaign.readers import expand
 from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
-from seakeep.files import expanded, is_there, sha256_of
+from seakeep.files import digest_of, expanded, is_there, sha256_of
 from seakeep.study.resolve import mistakes_of
 from seakeep.toml import (
     Count,
@@ -285,7 +283,7 @@ class Study:
                 if each.is_file()
             }
         content["format"] = FORMAT
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return digest_of(content)
 
 
 def read_study(path: Path | str) -> Study:
