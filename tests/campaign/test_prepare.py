@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 from small_tank import DT, tank_columns, write_csv
 
+from seakeep import DataError, RequestError
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError
 from seakeep.files import write_netcdf
 from seakeep.signals import (
     band_pass,

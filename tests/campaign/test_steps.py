@@ -10,7 +10,7 @@ from seas import sea
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
-from seakeep.campaign import read_campaign
+from seakeep import read_campaign
 from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 

@@ -6,10 +6,9 @@ from drifting import DT, INPUTS
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
+from seakeep import HankelDMDc, Powers, SlowSquares
 from seakeep.core.observables import slow_kernel, slow_squares
-from seakeep.models import HankelDMDc
 from seakeep.models.labelled import Span, channel_labels
-from seakeep.models.observables import Powers, SlowSquares
 
 PERIOD = 15  # samples
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
