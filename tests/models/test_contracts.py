@@ -17,6 +17,7 @@ from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform
 from seakeep.models import KINDS, InputMap, alignment, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
+from seakeep.models.validity import Coverage
 
 DT, HEAVE = 0.1, (["heave"], ["eta"])
 
@@ -109,6 +110,8 @@ def test_higher_waves_and_a_drift_are_outside():
 
 def test_a_forecast_says_by_how_much_and_reads_its_own_surge():
     run = regular()
+    wind = Coverage.of(["eta", "wind"], [np.stack([run.eta, run.eta], axis=1)], 0.1)
+    assert np.isfinite(wind.steepnesses).tolist() == [True, False]
     high = run.map(lambda x: 1.5 * x, keep_attrs=True)  # as the oldest xarray takes it
     high["surge"].values[high["time"].values > 20.0] = np.nan
     words = "eta: a height of 3 m, trained up to 2 m; eta: a steepness in deep water of 0.48, "

@@ -153,6 +153,12 @@ def test_a_dead_sensor_is_followed_through_the_others(model, live, drift):
     assert not live.covariance.any()
 
 
+def test_before_the_history_is_there_nothing_is_known_of_a_dead_sensor(model, drift):
+    live = model.live(like=drift)
+    play(live, drift, 0, 5, dead=["heave"])
+    assert_allclose(np.sqrt(live.covariance[1, 1]), model.state_scale.spread[1], rtol=1e-12)
+
+
 def test_errors_of_an_estimate_last_as_those_of_free_runs_do(live, drift):
     free = DelayFilter(live._a, live._filter.process, live._noise, 0 * live._filter.covariance)
     rms = live.errors.rms
