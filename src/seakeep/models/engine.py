@@ -698,10 +698,10 @@ def member_series(
     RequestError
         If the temporary folder has no room.
     """
-    count, channels = model.n_members, len(model.signature.states)
+    count = model.n_members
     runs: list[Series] = [
         (
-            _room((count, len(each), each.steps, channels)),
+            _room((count, len(each), each.steps, len(model.signature.states))),
             np.empty((count, len(each)), dtype=np.int64),
         )
         for each in groups

@@ -650,14 +650,14 @@ class HankelEnsemble(Model):
     @cached_property
     def errors(self) -> LeadErrors | None:
         """Errors of the members' mean on what they learnt from; None where that is too short."""
-        signature, arrays, members = self.signature, self.arrays, self._means
+        signature, arrays = self.signature, self.arrays
         series: Any = zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
         first = signature.history_samples - 1
         if signature.input_map.reference:  # departures need no period before a start
             series = departing(series, signature.input_map)
             first = max(signature.state_delays, signature.input_delays)
         stretches = [Stretch(x, u, v, first, min(len(x) - 1, len(u))) for x, u, v in series]
-        return linear_errors(members, stretches, signature.readouts)
+        return linear_errors(self._means, stretches, signature.readouts)
 
     def _drawn(self, name: str) -> str:
         """A length as drawn, and in samples."""
