@@ -572,7 +572,7 @@ CHANGES = {
         ("alike < LEAST_SHARED or ", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
         (" or abs(rate - 1) > max(LARGEST_DRIFT, 2.0 * drift_error)", "", "signals/test_synchronisation.py::test_what_is_no_clock_is_refused"),
         ("math.sqrt(2) * getattr(clock, key)", "getattr(clock, key)", "signals/test_synchronisation.py::test_windows_that_share_a_half_are_not_counted_twice"),
-        ("low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series", "series", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
+        ("return low_pass(series, dt, edge, 2 * edge), ", "return series, ", "signals/test_synchronisation.py::test_a_shared_signal_gives_honest_errors_through_the_noise_of_both"),
     ],
     "quality/sensors.py": [
         (' and noise_share(sound(run, name)) <= 0.5', '', "campaign/test_positions.py::test_still_water_and_noise_place_no_probes"),
@@ -622,7 +622,7 @@ CHANGES = {
     "study/plan.py": [
         ("{**known, name: runs[name]}", "runs", "study/test_windows.py::test_an_irregular_run_that_tests_groups_no_regular_ones_that_train"),
         ("return run not in self.like", "return run in self.left_out", "study/test_windows.py::test_a_run_tests_only_where_no_run_of_its_sea_state_trains"),
-        ("float(span[0]) + test.startup", "float(span[0])", "study/test_windows.py::test_the_start_up_of_a_test_span_is_cut_off"),
+        ("span[0] + test.startup", "span[0]", "study/test_windows.py::test_the_start_up_of_a_test_span_is_cut_off"),
         ("step = 1 if drawn else max(width, 1)", "step = 1", "study/test_windows.py::test_training_windows_hold_the_largest_draw_with_its_history"),
         ("list(dict.fromkeys([*firsts.values(), *places]))[:count]", "places[:count]", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),
         ("shares |= {run: each.name for each in training for run in each.left_out}", "shares |= {}", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),
