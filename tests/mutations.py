@@ -27,6 +27,8 @@ PASSED, FAILED = 10, 11  # exit status: that of pytest plus ten, as Python itsel
 # tests below tests/ that fail.
 CHANGES = {
     "campaign/derivation.py": [
+        ("and target in units", "and target not in units", "campaign/test_prepare.py::test_an_expression_of_radians_is_not_in_degrees"),
+        ("(MISSING | BRIDGED)) > 0)", "BRIDGED) > 0)", "campaign/test_steps.py::test_an_integral_is_right_beside_a_gap"),
         ("rotation_matrix(angles)[:, 2, axis]", "rotation_matrix(angles)[:, axis, 2]", "campaign/test_steps.py::test_gravity_is_removed_from_one_accelerometer"),
     ],
     "campaign/guesses.py": [
@@ -310,7 +312,7 @@ CHANGES = {
         ("farthest <= _excess(signature, windows)", "farthest <= 1.0", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
         ("slice(span.known + 1 - signature.state_samples", "slice(span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
-        ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
+        ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_ensembles_windows_and_arrays_predict_alike"),
         ("[:, -reference:].mean(axis=1)", "[:, -1:].mean(axis=1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
         ("zero[:, follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
         ("drive.rows(at.known + 1 - reference, at.known + 1)", "drive.rows(at.known + 2 - reference, at.known + 1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
@@ -335,7 +337,7 @@ CHANGES = {
         ("enumerate(at) if each <= place]", "enumerate(at)]", "models/test_live.py::test_a_dead_probe_is_filled_by_no_more_than_waves"),
     ],
     "models/forecasts.py": [
-        ("np.stack([states[at + 1 : at + 1 + steps] for at in starts])", "np.stack([states[at : at + steps] for at in starts])", "check/test_free.py::test_free_runs_of_an_ensemble_are_the_mean_of_its_members"),
+        ("np.stack([states[at + 1 : at + 1 + steps] for at in starts])", "np.stack([states[at : at + steps] for at in starts])", "check/test_residuals.py::test_a_right_model_leaves_white_errors"),
         ('"diverged_at": lost, ', "", "models/test_stability.py::test_a_forecast_that_diverges_ends_in_nan_with_its_status"),
         ("first = max(len(after) - signature.lead_samples + 1, 0)", "first = 0", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),
     ],
@@ -344,7 +346,7 @@ CHANGES = {
         ("if windows.departures and model.errors is not None:", "if False:", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
         ("return (n + p) / (n - p)", "return 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
         ("self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
-        ("middle.var(axis=0, ddof=1)", "middle.var(axis=0, ddof=0)", "models/test_live.py::test_members_that_are_held_give_the_mean_of_the_ensemble"),
+        ("middle.var(axis=0, ddof=1)", "middle.var(axis=0, ddof=0)", "models/test_ensemble.py::test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays"),
         ("np.mean(apart**2, axis=0), axis=-2)[..., late:, :]", "np.mean(apart**2, axis=0)[..., late:, :], axis=-2)", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("apart = 0.5 * np.abs(plus - minus)", "apart = np.abs(plus - minus)", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("(0.5 * (plus + minus) - middle[:, None])", "(0.0 * (plus + minus - middle[:, None]))", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
@@ -373,8 +375,8 @@ CHANGES = {
     ],
     "models/live.py": [
         ("np.where(is_smooth, SMOOTH * spread, np.inf)", "SMOOTH * spread", "models/test_live.py::test_a_load_may_jump_and_so_may_an_input_that_is_no_wave"),
-        ("np.minimum(self._raised, most)", "most", "models/test_live.py::test_errors_of_an_estimate_last_as_those_of_free_runs_do"),
-        ("errors.rms[-1] ** 2 / np.maximum(reached", "errors.rms[0] ** 2 / np.maximum(reached", "models/test_live.py::test_errors_of_an_estimate_last_as_those_of_free_runs_do"),
+        ("np.minimum(self._raised, np.maximum(most, 1.0))", "np.minimum(self._raised, most)", "models/test_live.py::test_before_the_history_is_there_nothing_is_known_of_a_dead_sensor"),
+        ("excess = errors.rms[-1]", "excess = errors.rms[0]", "models/test_live.py::test_errors_of_an_estimate_last_as_those_of_free_runs_do"),
         ("self._count.doubtful = self._ahead + LATE", "pass", "models/test_live.py::test_a_sample_that_jumps_is_lost_and_named"),
         ("is_driven = not read[:, self._waves].any()", "is_driven = True", "models/test_live.py::test_filled_waves_drive_no_free_run"),
         ("sums += (1.0 - self._fade[1]) * (weights - sums)", "pass", "models/test_live.py::test_filled_waves_drive_no_free_run"),
@@ -449,7 +451,7 @@ CHANGES = {
     ],
     "models/training.py": [
         ("/ (pooled.shape[1] - 1))", "/ pooled.shape[1])", "models/test_training_window.py::test_moments_are_those_of_the_windows_pooled_with_ddof_one"),
-        ("final = last - input_map.after", "final = last", "models/test_contracts.py::test_a_known_lead_is_learnt_and_forecast"),
+        ("final = last - input_map.after", "final = last", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
         ("last -= last > 0 and time[last] > float(at) + 1e-3 * step", "pass", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
         ("means[0][input_map.follows.column] = means[2][-1] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
     ],
@@ -513,6 +515,9 @@ CHANGES = {
         ("if self.upper < other.lower:", "if self.value < other.value:", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
     ],
     "signals/calculus.py": [
+        ("out = np.clip(out, *bounds)", "out = np.clip(out, None, None)", "signals/test_filters.py::test_gaps_have_the_waves_that_are_expected"),
+        ("noise = 1e-3 * out.std()", "noise = 0.0 * out.std()", "signals/test_filters.py::test_gaps_have_the_waves_that_are_expected"),
+        ("(own, -known)", "(own, known)", "campaign/test_steps.py::test_an_integral_is_right_beside_a_gap"),
         ("(gain / (1j * omega) ** times)", "(gain / (-1j * omega) ** times)", "signals/test_filters.py::test_integral_of_a_wave_in_the_band"),
         ("(slope / dt if times == 1", "(slope if times == 1", "signals/test_rigid_body.py::test_blend_keeps_slow_motion_and_needs_no_drift_removal"),
         ("reflection = -2.0 * float(", "reflection = -1.0 * float(", "signals/test_prediction.py::test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it"),
@@ -587,8 +592,8 @@ CHANGES = {
         ("STRETCH = 20.0", "STRETCH = 30.0", "signals/test_leakage.py::test_a_loop_of_forty_seconds_within_a_test"),
         (" or record.size < length", "", "signals/test_leakage.py::test_a_few_waves_are_alike_in_any_two_seas"),
         ("np.gradient(series) if is_motion else series, 1.0).start", "series, 1.0).stop", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
-        ("np.clip(np.round(number / peak), 1, 3)", "1", "signals/test_waves.py::test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not"),
-        ("max(0.1 * peak, 2.5)", "max(0.3 * peak, 2.5)", "signals/test_waves.py::test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not"),
+        ("np.clip(np.round(cycles / peak), 1, 3)", "1", "signals/test_waves.py::test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not"),
+        ("max(0.1 * peak, 1.5)", "max(0.1 * peak, 2.5)", "signals/test_waves.py::test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not"),
         ("4.0 * float(np.std(as_series(series)))", "2.0 * float(np.std(as_series(series)))", "signals/test_waves.py::test_statistics_of_a_regular_wave"),
         ("before - x[before] / (x[before + 1] - x[before])", "before + x[before] / (x[before + 1] - x[before])", "signals/test_waves.py::test_crossings_lie_between_samples"),
         ("key=lambda each: each.correlation", "key=lambda each: -each.correlation", "signals/test_leakage.py::test_equally_spaced_components_come_back_after_116_5_seconds"),

@@ -8,7 +8,7 @@ import xarray as xr
 from numpy.testing import assert_array_equal
 from said import request_error
 
-from seakeep import core, metrics, signals, statistics, waves
+from seakeep import DataError, RequestError, SeakeepError, core, metrics, signals, statistics, waves
 from seakeep.arrays import (
     as_bundle,
     as_pair,
@@ -19,7 +19,6 @@ from seakeep.arrays import (
     positive,
     whole_number,
 )
-from seakeep.errors import DataError, RequestError, SeakeepError
 
 T = np.arange(0, 60, 0.05)
 X, Y = (np.sin(2.0 * t) + 0.3 * np.sin(3.1 * t + 1.0) for t in (T, T - 0.3))

@@ -16,8 +16,7 @@ import seakeep
 from seakeep import cli, formats, models, quality
 from seakeep.baselines import FIR
 from seakeep.core import Solution
-from seakeep.quality import Record, findings_of, warn_of
-from seakeep.quality.findings import as_json
+from seakeep.quality import Record, as_json, findings_of, warn_of
 from seakeep.study import fit_baselines, read_study, run_study
 
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")

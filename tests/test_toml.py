@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field
 
-from seakeep.errors import RequestError
+from seakeep import RequestError
 from seakeep.toml import Length, Names, Positive, Table, parse_length, read_toml, validated
 
 

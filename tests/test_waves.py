@@ -20,8 +20,8 @@ def test_shallow_water():
     depth, omega = 2.0, 1e-4
     # The first correction is of the order (kh)²/6 = 3e-10.
     speed = np.sqrt(GRAVITY * depth)
-    assert_allclose(phase_speed(omega, depth), speed, rtol=1e-8)
-    assert_allclose(group_speed(omega, depth), speed, rtol=1e-8)
+    for found in (phase_speed(omega, depth), group_speed(omega, depth)):
+        assert_allclose(found, speed, rtol=1e-8)
     assert phase_speed(0.0, depth) == group_speed(0.0, depth) == speed
     assert wavenumber(0.0, depth) == 0.0
 
@@ -32,6 +32,17 @@ def test_speeds_of_the_paper():
     assert_allclose(phase_speed(omega, depth=3.6), [1.811, 2.090, 2.560], atol=1e-3)
     # Printed group speeds are halves of these; at the longest wave, kh = 5.4, so are ours.
     assert_allclose(group_speed(omega, depth=3.6), [0.905, 1.045, 1.280], atol=1.5e-3)
+
+
+def test_group_speed_is_the_slope_of_the_dispersion_relation():
+    k, depth = np.array([0.1, 0.5, 1.0, 3.0]), 1.7
+    h = 1e-5
+    omega = [wavelength_to_frequency(2 * np.pi / (k + d), depth) for d in (-h, h)]
+    # Central difference: truncation of the order h², rounding of the order eps/h = 1e-11.
+    slope = (omega[1] - omega[0]) / (2 * h)
+    assert_allclose(
+        group_speed(wavelength_to_frequency(2 * np.pi / k, depth), depth), slope, rtol=1e-8
+    )
 
 
 @given(st.floats(0.01, 1e4), st.floats(0.01, 1e4) | st.just(np.inf))

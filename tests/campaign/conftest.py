@@ -4,7 +4,7 @@ import pytest
 from small_tank import CAMPAIGN, tank_columns, write_csv
 from tutorial_study import edit
 
-from seakeep.campaign import read_campaign
+from seakeep import read_campaign
 
 
 @pytest.fixture

@@ -4,8 +4,7 @@ import pytest
 from said import request_error
 from small_tank import CAMPAIGN
 
-from seakeep.campaign import read_campaign
-from seakeep.errors import RequestError
+from seakeep import RequestError, read_campaign
 
 
 def refusal(path):

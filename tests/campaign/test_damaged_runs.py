@@ -8,8 +8,8 @@ from said import data_error, warned
 from seas import sea
 from small_tank import DT, tank_columns, write_csv
 
+from seakeep import DataError, RequestError
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError
 from seakeep.quality import findings_of
 from seakeep.signals import encounter_period
 

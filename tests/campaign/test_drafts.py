@@ -9,8 +9,8 @@ from said import request_error
 from scipy import io
 from small_tank import tank_columns, write_csv
 
-from seakeep.campaign import read_campaign
-from seakeep.campaign.drafts import draft_campaign
+from seakeep import read_campaign
+from seakeep.campaign import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
 
 

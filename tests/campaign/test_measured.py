@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from said import warned
 
-from seakeep.campaign import read_campaign
-from seakeep.campaign.drafts import draft_campaign
+from seakeep import read_campaign
+from seakeep.campaign import draft_campaign
 
 pytestmark = pytest.mark.data
 FLUME, BASIN = "ntnu_ship_section", "sjtu_semisub"

@@ -7,7 +7,7 @@ from said import request_error
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
-from seakeep.campaign import read_campaign
+from seakeep import read_campaign
 from seakeep.models.settings import periods_to_samples
 from seakeep.quality import findings_of
 from seakeep.study import fit_campaign

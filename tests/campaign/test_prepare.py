@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 from small_tank import DT, tank_columns, write_csv
 
+from seakeep import DataError, RequestError
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError
 from seakeep.files import write_netcdf
 from seakeep.signals import (
     band_pass,
@@ -128,7 +128,7 @@ def test_derived_at_the_files_own_rate(changed):
             '[derived.twice]\nexpression = "2 * eta_fwd"\nunit = "m"\n'
             '[derived.waves]\nfrom = "pitch"\nstep = "band_pass"\nband = [0.3, 5]\n'
             '[derived.group]\nfrom = "eta_fwd"\nstep = "envelope_squared"\n'
-            '[derived.sway]\nexpression = "1000 * heave"\nunit = "mm"\n[runs.first]',
+            '[derived.sway]\nexpression = "1000 * pitch"\nunit = "mm"\n[runs.first]',
         )
     ).read_run("first")
     acc, eta = run["acc"].to_numpy(), run["eta_fwd"].to_numpy()
@@ -141,10 +141,17 @@ def test_derived_at_the_files_own_rate(changed):
     assert_array_equal(run["group"], envelope_squared(eta, DT))
     assert_array_equal(run["pitch_rate"], differentiate(run["pitch"], DT))
     # 'unit' is that of the expression's value: millimetres, kept as metres.
-    assert_allclose(run["sway"], run["heave"], rtol=1e-15)
+    assert_allclose(run["sway"], run["pitch"], rtol=1e-15)
     units = {n: run[n].attrs["units"] for n in ("speed", "way", "smooth", "group", "sway")}
     assert units == {"speed": "m/s", "way": "m", "smooth": "m", "group": "m^2", "sway": "m"}
     assert run["way"].attrs["long_name"] == "way of the bow"
+
+
+def test_an_expression_of_radians_is_not_in_degrees(changed):
+    # Converted from degrees it would be 57 times too small.
+    table = '[derived.trim]\nexpression = "pitch - mean(pitch)"\nunit = "deg"\n[runs.first]'
+    with pytest.raises(RequestError, match=r"some in 'rad', .* State unit = 'rad'"):
+        changed(("[runs.first]", table)).read_run("first")
 
 
 @pytest.mark.parametrize(("rate", "dt"), [("dt = 0.13", 0.13), ("steps_per_period = 32", 0.05)])

@@ -10,7 +10,7 @@ from seas import sea
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
-from seakeep.campaign import read_campaign
+from seakeep import read_campaign
 from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 
@@ -105,6 +105,29 @@ def test_motions_are_transferred_to_another_point(tmp_path):
             assert "m from where it was measured" in found.attrs["derived_from"]
     # The transfer is no trifle: without it heave of the bow would be off by its own size.
     assert abs(run["bow_heave"] - run["heave"]).max() > 0.1
+
+
+def test_an_integral_is_right_beside_a_gap(tmp_path):
+    # Packets of more than a wave are lost; a cubic across the gap leaves 3 SD beside it.
+    t = 0.1 * np.arange(3000)
+    omega, phase = np.linspace(0.7, 1.6, 12), np.arange(12.0) ** 2
+    heave = np.cos(np.outer(t, omega) + phase)
+    truth = heave.sum(axis=1)
+    acceleration = 0.05 - heave @ omega**2 + 0.03 * np.random.default_rng(0).standard_normal(t.size)
+    there = (t < 150) | (t >= 158)
+    columns = {"heave_acceleration [m/s^2]": acceleration, "truth [m]": truth}
+    run = prepared(
+        tmp_path,
+        {name: values[there] for name, values in columns.items()},
+        "preparation = {sampling_rate = 10, gaps = 'mask'}\n"
+        "channels = {heave_acceleration = {}, truth = {}}\n"
+        "derived.heave = {from = 'heave_acceleration', step = 'integrate', times = 2, "
+        "band = [0.04, 1.5]}\n",
+        time=t[there],
+    )
+    error = (run["heave"] - run["truth"]).values / truth.std()
+    assert_array_equal(np.isnan(error), ~there)
+    assert np.nanmax(np.abs(error[300:-300])) < 0.1
 
 
 @pytest.mark.parametrize("zeroed", [False, True])

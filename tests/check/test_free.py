@@ -9,7 +9,7 @@ from oscillators import Oscillator
 from records import record
 from said import data_error, warned
 
-from seakeep import BayesianHankelDMDc, HankelDMDc, LogUniform, check
+from seakeep import HankelDMDc, check
 from seakeep.check.parts import samples_in
 from seakeep.core.extremes import free_decay
 
@@ -108,21 +108,6 @@ def test_a_run_in_which_nothing_was_released_is_no_decay(model, released):
     for words, run in refused.items():
         with data_error(words):
             check.measured_decay(model, {"run": run})
-
-
-def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():
-    run = Oscillator(dt=DT).run(600)
-    spec = BayesianHankelDMDc(
-        encounter_period=3.0, window="4 T", state_delays="0.1 T",
-        input_delays="0.1 T", ridge=LogUniform(0.1, 10.0), n_members=3, seed=0,
-    )  # fmt: skip
-    ensemble = spec.fit(run, ["heave"], ["eta_fwd"], stop=20.0)
-    starts = np.searchsorted(run.time.values, [21.0, 25.0])
-    made, measured = ensemble.judged_runs(run, "run", starts, 20)
-    for at, free, truth in zip(starts, made, measured, strict=True):
-        members = ensemble.forecast(run, float(run.time[at]), 20)["heave"]
-        np.testing.assert_allclose(free[:, 0], members.mean("member"), rtol=1e-12)
-        np.testing.assert_array_equal(truth[:, 0], run.heave[at + 1 : at + 21])
 
 
 def test_a_forecast_starts_where_the_waves_have_come():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from records import record
 from scipy import signal
@@ -13,7 +14,7 @@ from seakeep.core.spectra import autocorrelation, input_correlation, ljung_box
 @pytest.fixture(scope="module")
 def run():
     """Heave answers the wave one and two samples before, with white process noise."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     wave = signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(3000))
     driven = 0.5 * np.roll(wave, 1) + 0.3 * np.roll(wave, 2) + 0.2 * rng.standard_normal(3000)
     heave = signal.lfilter([1.0], [1.0, -0.6], driven)
@@ -47,7 +48,7 @@ def test_bands_and_ages_add_up(run):
 @pytest.mark.oracle
 def test_ljung_box_is_that_of_statsmodels():
     diagnostic = pytest.importorskip("statsmodels.stats.diagnostic")
-    x = signal.lfilter([1, 0.2], [1], np.random.default_rng(1).standard_normal(400))
+    x = signal.lfilter([1, 0.2], [1], default_rng(1).standard_normal(400))
     ours = ljung_box(autocorrelation([x[:, None]], 12), 400)
     known = diagnostic.acorr_ljungbox(x, lags=[12])
     assert ours[0][0] == pytest.approx(known["lb_stat"].item(), rel=1e-9)  # rounding of an FFT
@@ -66,7 +67,7 @@ def test_records_shorter_than_the_lags_add_what_they_have():
 
 
 def test_limits_of_the_correlation_with_inputs_cover_as_they_say():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     wave = signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((2000, 1)), axis=0)
     errors = signal.lfilter([1.0], [1.0, -0.5], rng.standard_normal((2000, 500)), axis=0)
     found, limit = input_correlation([(errors, wave)], 40)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tutorial_study import edit
 
-from seakeep.errors import RequestError
+from seakeep import RequestError
 from seakeep.study import read_study, run_study
 from seakeep.study.run import compute, units_of
 from seakeep.study.store import UnitFolder

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep.core.readouts import KNOTS, LoadMap, best_place, features, floor_of, sums, weights_of
@@ -9,7 +10,7 @@ from seakeep.core.readouts import KNOTS, LoadMap, best_place, features, floor_of
 
 def motions_and_wave(seed=0, count=4000):
     """Surge, heave, and elevation and rate of a wave, standardised."""
-    return np.random.default_rng(seed).standard_normal((count, 4))
+    return default_rng(seed).standard_normal((count, 4))
 
 
 def test_features_are_those_of_the_recipe():
@@ -39,7 +40,7 @@ def test_weights_of_a_load_of_known_form_are_recovered_but_for_the_ridge():
 
 
 def test_the_place_is_the_one_that_other_runs_vouch_for():
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     runs = [motions_and_wave(seed, 500) for seed in range(3)]
     knots = np.quantile(runs[0][:, 0], KNOTS)
     loads = [each[:, 2] + each[:, 0] + 0.1 * rng.standard_normal(500) for each in runs]
@@ -52,8 +53,7 @@ def test_the_place_is_the_one_that_other_runs_vouch_for():
             for each in (fits_one, noisy, runs)
         ]
     )
-    assert best_place(products) == 2
-    assert best_place(products[:, :1]) == 2
+    assert best_place(products) == best_place(products[:, :1]) == 2
 
 
 def test_a_load_gives_way_to_its_state_outside_training():
@@ -71,7 +71,7 @@ def test_a_load_gives_way_to_its_state_outside_training():
 
 @pytest.mark.parametrize("taut", [0.5, 0.8, 0.98])
 def test_a_floor_is_found_where_a_line_rests_on_it(taut):
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     states = rng.normal(size=(4000, 2))
     pull = 2.0 * states[:, 0] + 0.3 * states[:, 1]
     slack = np.maximum(np.quantile(pull, 1 - taut), pull)

@@ -56,8 +56,7 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, part, al
     # rows of the inverse from its structure lose up to two more where there are fewer columns than
     # regressors, where they are not chosen (5e-10 at the median of 60 draws, 2e-8 at the worst).
     largest = np.abs(svd).max()
-    assert_allclose(chosen.coefficients, svd, rtol=0, atol=1e-10 * largest)
-    assert_allclose(dual, svd, rtol=0, atol=1e-10 * largest)
+    assert_allclose([chosen.coefficients, dual], [svd, svd], rtol=0, atol=1e-10 * largest)
     lost = 200 if all_rows and shape == WIDE else 1
     assert_allclose(primal, svd, rtol=0, atol=lost * 1e-10 * largest)
 
@@ -70,9 +69,9 @@ def test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below(sha
     limit = GRAM_LIMIT * np.sum(made.matrices()[0] ** 2)
     assert GRAM_LIMIT == 1e-6
     # The trace is summed to rounding; a millionth is beyond it.
-    assert made.solved(limit * (1 + 1e-6), all_rows=all_rows).method == form
-    assert made.solved(limit * (1 - 1e-6), all_rows=all_rows).method == "svd"
-    assert made.solved(0.0, all_rows=all_rows).method == "svd"
+    ridges = limit * (1 + 1e-6), limit * (1 - 1e-6), 0.0
+    methods = [made.solved(ridge, all_rows=all_rows).method for ridge in ridges]
+    assert methods == [form, "svd", "svd"]
 
 
 @pytest.mark.parametrize(("part", "digits"), [(1.01 * NARROW_LIMIT, 6), (1e-8, 8)])

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
+from records import rms
 
 from seakeep.core.embedding import TrainingWindow
 from seakeep.core.subspace import identify_subspace
@@ -10,7 +12,7 @@ from seakeep.core.subspace import identify_subspace
 
 def plant(seed=0, inputs=2):
     """A damped system with eigenvalues of radius 0.7 to 0.95."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     blocks = np.zeros((4, 4))
     for at in (0, 2):
         radius, angle = rng.uniform(0.7, 0.95), rng.uniform(0.2, 1.5)
@@ -27,7 +29,7 @@ def simulate(system, u, noise=0.0):
     for j, row in enumerate(u):
         out[j] = c @ z
         z = a @ z + b @ row
-    return out + noise * np.random.default_rng(1).normal(size=out.shape)
+    return out + noise * default_rng(1).normal(size=out.shape)
 
 
 def fitted(outputs, inputs, ridge=0.0, direct=None):
@@ -45,7 +47,7 @@ def modes(a):
 def test_a_known_system_is_recovered_and_forecast_to_rounding(inputs):
     # Of two runs, each from rest: pairs across their joint would not fit the system.
     system = plant(inputs=inputs)
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     u = [rng.normal(size=(n, inputs)) for n in (300, 200, 500)]
     y = [simulate(system, each) for each in u]
     found = fitted(y[:2], u[:2])
@@ -65,7 +67,7 @@ def test_a_mode_that_grows_is_moved_onto_the_unit_circle_and_no_other():
     slowest = np.abs(values) == np.abs(values).max()
     grown = np.where(slowest, 1.015 * values / np.abs(values), values)
     a = ((vectors * grown) @ np.linalg.inv(vectors)).real
-    u = np.random.default_rng(2).normal(size=(300, 2))
+    u = default_rng(2).normal(size=(300, 2))
     found = modes(fitted([simulate((a, b, c), u)], [u]).A)
     expected = np.where(slowest, values / np.abs(values), values)
     # The slower modes are small beside one that has grown a hundredfold.
@@ -74,22 +76,22 @@ def test_a_mode_that_grows_is_moved_onto_the_unit_circle_and_no_other():
 
 def test_direct_inputs_drive_and_do_not_tell_the_past():
     a, b, c = plant(inputs=3)
-    u = np.random.default_rng(9).normal(size=(500, 3))
+    u = default_rng(9).normal(size=(500, 3))
     y = simulate((a, b, c), u)
     found = fitted([y[:400]], [u[:400, :2]], direct=[u[:400, 2:]])
     # Without the past of the third input the filter estimates the state, no more.
     run = found.free_runs(y[None, 408:421], u[None, 408:490, :2], u[None, 420:490, 2:])[0]
     late = y[451:491]
-    assert np.sqrt(np.mean((run[30:] - late) ** 2)) < 0.05 * late.std()
+    assert rms(run[30:] - late) < 0.05 * late.std()
 
 
 def test_an_input_that_tells_its_own_future_needs_a_ridge_and_forecasts_with_it():
     system = plant(seed=6)
     time = np.arange(2000)
     u = np.stack([np.sin(0.3 * time), np.cos(0.3 * time) + np.sin(0.5 * time)], axis=1)
-    u += 1e-3 * np.random.default_rng(7).normal(size=u.shape)
+    u += 1e-3 * default_rng(7).normal(size=u.shape)
     y = simulate(system, u, noise=1e-3)
     found = fitted([y[:1200]], [u[:1200]], ridge=1e-6)
     run = found.free_runs(y[None, 1488:1501], u[None, 1488:1800], np.empty((1, 300, 0)))[0]
-    error = np.sqrt(np.mean((run - y[1501:1801]) ** 2)) / y.std()
+    error = rms(run - y[1501:1801]) / y.std()
     assert error < 0.02

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from loaded import loaded
 from places import ROOT
-from records import record
+from records import record, rms
 from scipy import signal
 
 import seakeep
@@ -51,6 +51,6 @@ def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():
     away = {}
     for plans in (False, True):
         surge = PLAN.play(model, drifting(3), plans) - model.state_scale.centre[0]
-        away[plans] = np.sqrt(np.mean(surge**2))
+        away[plans] = rms(surge)
     # A plan of another sign or another instant pushes it away.
     assert away[True] < 0.7 * away[False]

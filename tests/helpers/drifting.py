@@ -1,7 +1,7 @@
 """A synthetic run of a vessel that drifts in irregular waves, past two probes."""
 
 import numpy as np
-from records import record
+from records import record, rms
 from seas import Sea
 
 from seakeep import ProbeAlignment, SlowSquares
@@ -53,4 +53,4 @@ def heave_error(model, run):
     """Error of the heave of a forecast of 300 steps, of the SD of what was measured."""
     forecast = model.forecast(run, start=60.0, steps=300)
     measured = run["heave"].sel(time=forecast["time"])
-    return float(np.sqrt(np.mean((forecast["heave"] - measured) ** 2)) / measured.std())
+    return rms(forecast["heave"] - measured) / float(measured.std())

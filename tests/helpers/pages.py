@@ -8,8 +8,8 @@ import warnings
 
 from places import ROOT
 
+from seakeep import SeakeepWarning
 from seakeep.cli import main
-from seakeep.errors import SeakeepWarning
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 

@@ -1,4 +1,4 @@
-"""Runs made of arrays, in metres, and arrays of runs."""
+"""Runs made of arrays, in metres, arrays of runs, and how large their values are."""
 
 import numpy as np
 import xarray as xr
@@ -20,3 +20,8 @@ def record(step, /, attrs=None, **channels):
 def table(run, names):
     """Values of channels side by side, on the last axis."""
     return np.stack([run[name].values for name in names], axis=-1)
+
+
+def rms(values):
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))

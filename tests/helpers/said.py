@@ -2,7 +2,7 @@
 
 import pytest
 
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep import DataError, RequestError, SeakeepWarning
 
 
 def request_error(words):

@@ -9,10 +9,9 @@ import pytest
 from compiled import pointer
 from numpy.testing import assert_allclose, assert_array_equal
 
-from seakeep import ProbeAlignment
+from seakeep import HankelDMDc, ProbeAlignment
 from seakeep.hosts import write_c
 from seakeep.hosts.c import identifier
-from seakeep.models import HankelDMDc
 
 NAMES = ["full", "short", "arx", "autonomous", "unstable", "following", "following_now"]
 FINITE, REFUSED, LOST = 0, 1, 2

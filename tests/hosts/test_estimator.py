@@ -13,8 +13,8 @@ from records import table
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
+from seakeep.models import Live
 from seakeep.models.growth import LeadErrors
-from seakeep.models.live import Live
 from seakeep.models.validity import Validity
 from seakeep.signals.prediction import foresee
 

@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run, heave_error
 from numpy.testing import assert_array_equal
-from records import table
+from said import data_error
 
-from seakeep import DataError, HankelDMDc, ProbeAlignment, estimate_probe_offset
+from seakeep import HankelDMDc, ProbeAlignment, estimate_probe_offset
 from seakeep.models.labelled import Span
 
 
@@ -38,15 +38,6 @@ def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models, dr
     assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
     # With no surge and no offset the elevation stays where it is, to a transform's rounding.
     assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
-
-
-def test_a_linear_system_takes_what_the_model_aligned(models, drift):
-    model = models["effective"]
-    now = model.aligned_inputs(drift).isel(time=600)
-    system, state = model.to_state_space(), model.initial_state(drift, 60.0)
-    state = system.A @ state + system.B @ (table(now, INPUTS) - model.input_mean)
-    expected = table(model.forecast(drift, start=60.0, steps=1), STATES)
-    np.testing.assert_allclose(system.C @ state + model.state_mean, expected[0], atol=1e-7)
 
 
 @pytest.mark.parametrize("key", ["effective", "dispersion"])
@@ -99,6 +90,6 @@ def test_an_offset_is_found_with_its_spread(models):
 def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
     run = drifting_run(7)
     run["surge"].values[700] = np.nan
-    with pytest.raises(DataError, match=r"channel 'surge' of run has 1 missing .* at t = 70 s"):
+    with data_error(r"channel 'surge' of run has 1 missing .* at t = 70 s"):
         models["dispersion"].forecast(run, start=60.0, steps=300)
     models["dispersion"].forecast(run, start=60.0, steps=50)

@@ -1,18 +1,21 @@
 """Wrong data and wrong requests: each has its own message, and the message says the mend."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
+from said import data_error, request_error, warned
 
-from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning
+from seakeep import HankelDMDc
 
 DT = 0.05
-SPEC = HankelDMDc(3, 8, 1.0)
+fit = partial(HankelDMDc(3, 8, 1.0).fit, states=["heave", "pitch"], inputs=["eta_fwd", "eta_cog"])
 
 
 @pytest.fixture
-def model(run, channels):
-    return SPEC.fit(run, **channels)
+def model(run):
+    return fit(run)
 
 
 T = DT * np.arange(400)
@@ -26,29 +29,29 @@ WRONG_TIMES = {
 
 
 @pytest.mark.parametrize("message", WRONG_TIMES)
-def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, channels, message):
+def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, message):
     bad = run.assign_coords(time=WRONG_TIMES[message])
-    with pytest.raises(DataError, match=message):
-        SPEC.fit(bad, **channels)
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
+        fit(bad)
+    with data_error(message):
         model.forecast(bad, start=5.0, steps=5)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("name", ["heave", "eta_cog"])
-def test_gaps_in_the_window_are_refused(run, channels, name, value):
+def test_gaps_in_the_window_are_refused(run, name, value):
     run[name][250:253] = value
     message = rf"channel '{name}' of run has 3 missing or infinite value\(s\) .* t = 12\.5 s"
-    with pytest.raises(DataError, match=message + r".* gaps up to longest_gap are bridged where"):
-        SPEC.fit(run, **channels)
+    with data_error(message + r".* gaps up to longest_gap are bridged where"):
+        fit(run)
 
 
 def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
     run.heave[98] = np.nan
-    with pytest.raises(DataError, match=r"'heave' .* 1 missing .* the first at t = 4\.9 s"):
+    with data_error(r"'heave' .* 1 missing .* the first at t = 4\.9 s"):
         model.forecast(run, start=5.0, steps=20)
     run.eta_fwd[150] = np.nan
-    with pytest.raises(DataError, match=r"'eta_fwd' .* the first at t = 7\.5 s"):
+    with data_error(r"'eta_fwd' .* the first at t = 7\.5 s"):
         model.forecast(run, start=6.0, steps=40)
 
 
@@ -60,10 +63,10 @@ def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
         "timedelta64": np.arange(400).astype("timedelta64[ns]"),
     }.items(),
 )
-def test_a_channel_that_is_not_a_number_is_refused(run, channels, values, kind):
+def test_a_channel_that_is_not_a_number_is_refused(run, values, kind):
     bad = run.assign(heave=("time", values))
-    with pytest.raises(DataError, match=f"'heave' of run is of type {kind}.*, not a real number"):
-        SPEC.fit(bad, **channels)
+    with data_error(f"'heave' of run is of type {kind}.*, not a real number"):
+        fit(bad)
 
 
 ARRAYS = {"x_history": (9, 2), "u_history": (9, 2), "u_future": (19, 2)}
@@ -84,7 +87,7 @@ ARRAYS = {"x_history": (9, 2), "u_history": (9, 2), "u_future": (19, 2)}
 )
 def test_arrays_of_another_shape_are_refused_and_never_turned(model, name, shape, message):
     arrays = {key: np.zeros(size) for key, size in (ARRAYS | {name: shape}).items()}
-    with pytest.raises(RequestError, match=f"{name} has shape {message}"):
+    with request_error(f"{name} has shape {message}"):
         model.forecast_arrays(**arrays, steps=20)
 
 
@@ -105,20 +108,20 @@ def test_a_run_that_is_too_short_is_told_how_many_samples_are_missing(
     run, channels, settings, samples, missing
 ):
     short = run.isel(time=slice(0, samples))
-    with pytest.raises(DataError, match=missing):
+    with data_error(missing):
         HankelDMDc(3, 8, 1.0, **settings).fit(short, **channels)
 
 
-def test_the_shortest_run_that_is_long_enough_trains(run, channels):
-    assert SPEC.fit(run.isel(time=slice(0, 10)), **channels).training.columns == (1,)
+def test_the_shortest_run_that_is_long_enough_trains(run):
+    assert fit(run.isel(time=slice(0, 10))).training.columns == (1,)
 
 
-def test_runs_of_another_step_are_refused(model, run, channels):
+def test_runs_of_another_step_are_refused(model, run):
     coarse = run.isel(time=slice(None, None, 2))
     message = r"time step of 0\.1 s and the model one of 0\.05 s\. Resample"
-    with pytest.raises(DataError, match=message):
-        SPEC.fit([run, coarse], **channels)
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
+        fit([run, coarse])
+    with data_error(message):
         model.forecast(coarse, start=5.0, steps=5)
 
 
@@ -127,18 +130,18 @@ def test_runs_of_another_step_are_refused(model, run, channels):
 def test_a_constant_channel_cannot_be_standardised(run, channels, name, value):
     run[name][:] = value
     message = rf"channel '{name}' is constant \(.*\) over the training window"
-    with pytest.raises(DataError, match=message):
-        SPEC.fit(run, **channels)
+    with data_error(message):
+        fit(run)
     model = HankelDMDc(3, 8, 1.0, standardize=False).fit(run, **channels)
     assert np.all(np.isfinite(model.forecast(run, start=5.0, steps=20).heave))
 
 
-def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(make_run, channels):
+def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(make_run):
     slack = make_run(seed=1)
     slack.pitch[:] = 0.1
     message = r"channel 'pitch' of run 2 is constant \(0\.1\) .* If its sensor was dead, leave"
-    with pytest.warns(SeakeepWarning, match=message):
-        model = SPEC.fit([make_run(), slack], **channels)
+    with warned(message):
+        model = fit([make_run(), slack])
     assert np.all(model.state_std > 0)
 
 
@@ -146,7 +149,7 @@ def test_another_unit_than_trained_is_refused(model, run):
     degrees = run.copy()
     degrees["pitch"] = np.degrees(run.pitch).assign_attrs(units="deg")
     message = r"channel 'pitch' of .* is in 'deg' and the model expects 'rad'\. Convert"
-    with pytest.raises(DataError, match=message):
+    with data_error(message):
         model.forecast(degrees, start=5.0, steps=5)
 
 
@@ -173,9 +176,9 @@ def test_another_unit_than_trained_is_refused(model, run):
         "has no coordinate 'time' .*sample": {"runs": xr.Dataset({"heave": ("sample", [0.0])})},
     }.items(),
 )
-def test_what_fit_refuses(run, channels, changes, message):
-    with pytest.raises(RequestError, match=message):
-        SPEC.fit(**{"runs": run, **channels, **changes})
+def test_what_fit_refuses(run, changes, message):
+    with request_error(message):
+        fit(**{"runs": run, **changes})
 
 
 @pytest.mark.parametrize(
@@ -193,13 +196,13 @@ def test_what_fit_refuses(run, channels, changes, message):
 )
 def test_what_a_forecast_refuses(model, run, start, steps, message):
     forecast = model.forecast if np.isscalar(start) else model.forecast_windows
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         forecast(run, start, steps)
     assert model.forecast(run, start=0.4, steps=5).sizes["time"] == 5
 
 
 def test_a_run_shorter_than_the_history_has_no_later_start(model, run):
-    with pytest.raises(RequestError, match=r"needs 9 .*The run ends at 0\.35 s: give a longer one"):
+    with request_error(r"needs 9 .*The run ends at 0\.35 s: give a longer one"):
         model.forecast(run.isel(time=slice(0, 8)), 0.25, 1)
 
 
@@ -221,13 +224,11 @@ def test_a_run_shorter_than_the_history_has_no_later_start(model, run):
     }.items(),
 )
 def test_wrong_settings_are_refused(settings, message):
-    with pytest.raises(RequestError, match=message):
+    with request_error(message):
         HankelDMDc(**{"state_delays": 3, "input_delays": 8, "ridge": 1.0, **settings})
 
 
 def test_a_period_and_a_step_that_were_swapped_are_told():
     for make in (HankelDMDc.paper, HankelDMDc.recommended):
-        with pytest.raises(
-            RequestError, match=r"dt = 9 s is no shorter than .* 0\.1 s\. Are the tw"
-        ):
+        with request_error(r"dt = 9 s is no shorter than .* 0\.1 s\. Are the tw"):
             make(0.1, 9.0)

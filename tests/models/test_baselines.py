@@ -1,15 +1,15 @@
 """Baselines: what they are, against other packages and known systems; files; runs of any kind."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
+from said import request_error
 
 from seakeep import SlowSquares
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
-from seakeep.errors import RequestError
 from seakeep.models.selection import select
 
 DT = 0.1
@@ -68,7 +68,7 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     test = linear_run(3)
     # Four states, and one for the constant by which the means of the samples are off.
     change = {"ridge": 0.0, "order": 5} if kind == "subspace" else {}
-    spec = dataclasses.replace(SPECS[kind], **change)
+    spec = replace(SPECS[kind], **change)
     forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
     assert_allclose(table(forecast, STATES), table(test, STATES)[201:501], atol=1e-7)
 
@@ -83,7 +83,7 @@ def test_fir_finds_a_known_impulse_response():
     found = model.coefficients[:, 2:]
     assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
     assert model.spectral_radius == 0.0
-    with pytest.raises(RequestError, match=r"FIR model is a filter of its inputs and has none"):
+    with request_error(r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
 
 
@@ -104,12 +104,12 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
     # What a window leaves out decides nothing.
     other = given[0].copy(deep=True)
     other["heave"][:200] += 1.0
-    window = dataclasses.replace(spec, window=250)
+    window = replace(spec, window=250)
     few = [window.fit(run, STATES, INPUTS) for run in (given[0], other)]
     assert_array_equal(few[0].coefficients, few[1].coefficients)
     # Also where an observable counts in periods of the runs.
     counts, states = (
-        dataclasses.replace(window, observables=(SlowSquares(INPUTS, period=each, lead=0.0),))
+        replace(window, observables=(SlowSquares(INPUTS, period=each, lead=0.0),))
         for each in (None, period)
     )
     models = [each.fit(given, STATES, INPUTS) for each in (counts, states)]

@@ -8,16 +8,9 @@ import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
 from numpy.testing import assert_allclose
 from records import record, table
+from said import request_error
 
-from seakeep import (
-    BayesianHankelDMDc,
-    HankelDMDc,
-    Powers,
-    RequestError,
-    SlowSquares,
-    Uniform,
-    load_model,
-)
+from seakeep import BayesianHankelDMDc, HankelDMDc, Powers, SlowSquares, Uniform, load_model
 from seakeep.baselines import ARX, Subspace
 from seakeep.hosts.program import exportable
 
@@ -159,12 +152,12 @@ def test_words():
     model = SPEC.fit(runs_of(0.0, 1.0), *CHANNELS)
     run = vessel(9)
     for refused in (model.live, model.to_state_space, lambda: exportable(model)):
-        with pytest.raises(RequestError, match=r"\(centre = 'run'\), which forecast"):
+        with request_error(r"\(centre = 'run'\), which forecast"):
             refused()
-    with pytest.raises(RequestError, match="the model needs 241"):
+    with request_error("the model needs 241"):
         model.forecast(run, start=20.0, steps=10)
     assert "means of 240 samples up to a start" in model.summary()
     assert SPEC.resolved(DT, PERIOD * DT / 30).needs(DT).history + 1 == model.history_samples
     assert HankelDMDc(1, 0, 1.0, centre="pooled").centre == 0
-    with pytest.raises(RequestError, match="centre: "):
+    with request_error("centre: "):
         HankelDMDc(1, 0, 1.0, centre="runs")

@@ -5,19 +5,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
+from said import data_error, warned
 from scipy import stats
 
 import seakeep
-from seakeep import (
-    BayesianHankelDMDc,
-    DataError,
-    HankelDMDc,
-    LogUniform,
-    SeakeepWarning,
-    Uniform,
-)
+from seakeep import BayesianHankelDMDc, HankelDMDc, LogUniform, Uniform
 from seakeep.models import engine, forecasts
 from seakeep.models.draws import child
 from seakeep.toml import Length
@@ -69,7 +64,8 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     assert_allclose(mean, expected, **close)
     one_step = table(single.forecast(unseen, 64.6, 1), STATES)[0]
     assert_allclose(live.innovation, x[now - 4] - one_step, **close)  # three wait for waves ahead
-    assert np.all(std > single.errors.at(np.arange(1, 121)))  # the members' spread comes on top
+    both = np.hypot(wanted[1], live.errors.at(np.arange(1, 121)))  # of members, and of any model
+    assert_allclose(std, both, rtol=1e-9)
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
     two = settings.fit({name: runs[name] for name in "ac"}, STATES, INPUTS)
     expected = table(two.forecast(unseen, 65.0, 120), STATES)
@@ -112,7 +108,7 @@ def test_priors_that_never_fit_are_refused(run):
         r"no feasible draw in 1000: the shortest run has 601 samples up to stop, and the last "
         r"draw asked for \d+ \(window 800, .*\). Give longer runs or a later stop, or narrow"
     )
-    with pytest.raises(DataError, match=text):
+    with data_error(text):
         fitted(run, window="50 T")
 
 
@@ -120,10 +116,10 @@ def test_the_seed_may_be_a_sequence_or_a_generator(run):
     sequence = np.random.SeedSequence(3)
     xr.testing.assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
     assert sequence.n_children_spawned == 0
-    spec = small(seed=np.random.default_rng(1), lead="0.2 T")
+    spec = small(seed=default_rng(1), lead="0.2 T")
     first, second = (spec.fit(run, STATES, INPUTS, stop=60.0).draws for _ in range(2))
     xr.testing.assert_identical(first, second)
-    assert child(sequence, 2).random() == np.random.default_rng(sequence.spawn(3)[2]).random()
+    assert child(sequence, 2).random() == default_rng(sequence.spawn(3)[2]).random()
 
 
 def test_the_summary_is_that_of_the_members(run, monkeypatch):
@@ -151,6 +147,8 @@ def test_windows_side_by_side_equal_single_forecasts(run):
         # Two windows are one product: other roundings.
         found = table(together, STATES)[window]
         assert_allclose(found, table(single, STATES), atol=1e-10)
+    judged, _ = ensemble.judged_runs(run, "run", [650, 703], 60)
+    assert_allclose(judged, table(together, STATES).mean(axis=1), atol=1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
     expected = seakeep.summarize(together)
     assert_array_equal(table(summary, STATES), table(expected, STATES))
@@ -182,7 +180,7 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
 
 def test_members_that_diverge_say_when():
     # Explosive data make explosive members.
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     time = DT * np.arange(300)
     growth = np.exp(2.5 * time) * np.cos(5 * time) * 1e-9
     heave = growth + 1e-12 * rng.normal(size=300)
@@ -200,9 +198,7 @@ def test_members_that_diverge_say_when():
     assert_array_equal(summary.status, forecast.status)
     assert summary.attrs["diverged"] == forecast.attrs["diverged"] == lost.sum()
     assert forecast.attrs["status"] == f"{lost.sum()} of 10 members diverged"
-    with pytest.warns(
-        SeakeepWarning, match=r"\d+ of 10 members have a spectral radius of one or mor"
-    ):
+    with warned(r"\d+ of 10 members have a spectral radius of one or mor"):
         radii = ensemble.spectral_radii()
     assert np.all(radii[lost] > 1)
     assert f"({np.sum(radii >= 1)} of 10 UNSTABLE: their long forecasts" in ensemble.summary()

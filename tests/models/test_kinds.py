@@ -9,9 +9,9 @@ from free_runs import loop_score
 from records import record
 from squared import INPUTS, PERIOD, STATES, runs
 
-from seakeep import HankelDMDc, Select, tune
+from seakeep import HankelDMDc, tune
 from seakeep.baselines import ARX, FIR, Subspace
-from seakeep.campaign.settings import ModelSettings
+from seakeep.campaign import ModelSettings
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 
@@ -55,7 +55,8 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
     assert "kind = " not in result.note
 
 
-def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tune():
+def test_a_kind_that_is_better_beyond_the_noise_is_taken_by_tune():
+    """That `fit` names it: `tests/study/test_fit.py`."""
     given = {f"run {seed}": filtered(seed) for seed in range(4)}
     # The waves tell all but the noise, which 41 delayed states in it learn by heart.
     spec = HankelDMDc(40, 3, 1e-5, delay_rows="exact", ridge_scale="per_snapshot")
@@ -67,10 +68,6 @@ def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tun
     taps = model.B[0] * model.state_std / model.input_std
     # Of 4 runs of 200 samples in noise of SD 1: to 0.035 each.
     np.testing.assert_allclose(taps, [1.0, -0.5, 0.3, 0.0], rtol=0, atol=0.12)
-    select = Select(memory=True, period=0.4, horizon=(5,))
-    fitted = replace(spec, ridge="rollout", select=select).fit(given, ["heave"], ["eta"])
-    assert isinstance(fitted.settings, HankelDMDc)
-    assert "kind = 'fir' errs 0." in fitted.selection
 
 
 @pytest.mark.parametrize("spec", [FIR(24, 1e-3, lead=3), Subspace(8, 24, 0.1), ARX(8, 16, 1e-2)])

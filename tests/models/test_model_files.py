@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from said import data_error
 from scipy import io
 
 from seakeep import DataError, HankelDMDc, load_live, load_model
@@ -23,23 +24,23 @@ def saved(model, tmp_path):
 def test_a_truncated_file_is_refused(saved, part):
     content = saved.read_bytes()
     saved.write_bytes(content[: int(part * len(content))])
-    with pytest.raises(DataError, match=r"was cut off, altered .*no checksum at its end"):
+    with data_error(r"was cut off, altered .*no checksum at its end"):
         load_model(saved)
 
 
 def test_a_file_of_another_kind_is_named(run, saved, tmp_path):
     (tmp_path / "run.csv").write_text("t,heave\n0,1\n")
-    with pytest.raises(DataError, match=r"run\.csv is no NetCDF file, as seakeep writes"):
+    with data_error(r"run\.csv is no NetCDF file, as seakeep writes"):
         load_model(tmp_path / "run.csv")
     write_netcdf(tmp_path / "table.nc", run)
     write_sealed(run, tmp_path / "run.nc", "prepared run")
     for name, kind in (("table", "table"), ("run", "prepared run")):
-        with pytest.raises(DataError, match=rf"{name}\.nc holds a {kind}, and a model is expected"):
+        with data_error(rf"{name}\.nc holds a {kind}, and a model is expected"):
             load_model(tmp_path / f"{name}.nc")
     model = load_model(saved)
-    with pytest.raises(DataError, match="holds a model, and a live state is expected here"):
+    with data_error("holds a model, and a live state is expected here"):
         load_live(model, saved)
-    with pytest.raises(DataError, match="holds a live state, and a model is expected here"):
+    with data_error("holds a live state, and a model is expected here"):
         load_model(model.live().save(tmp_path / "live.nc"))
 
 
@@ -64,7 +65,7 @@ def test_a_single_bit_that_changed_is_noticed(saved, part):
         damaged = bytearray(content)
         damaged[place] ^= 1
         saved.write_bytes(damaged)
-        with pytest.raises(DataError, match="its checksum is another one"):
+        with data_error("its checksum is another one"):
             load_model(saved)
 
 
@@ -76,8 +77,7 @@ def test_a_mat_file_carries_what_idss_asks_for(model, tmp_path):
         *("heave(k)", "pitch(k)", "heave(k-1)"),
         *("pitch(k-3)", "eta_fwd(k-1)", "eta_cog(k-1)"),
     ]
-    assert content["InputName"].tolist() == ["eta_fwd", "eta_cog"]
-    assert content["OutputName"].tolist() == ["heave", "pitch"]
-    assert content["OutputUnit"].tolist() == ["m", "rad"]
+    lists = [content[key].tolist() for key in ("InputName", "OutputName", "OutputUnit")]
+    assert lists == [["eta_fwd", "eta_cog"], ["heave", "pitch"], ["m", "rad"]]
     assert content["Ts"] == model.dt
     assert content["D"].shape == (2, 2)

@@ -1,15 +1,17 @@
 """Observables and lead: from a measured run to the columns that drive a model."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from drifting import DT, INPUTS
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
+from seakeep import HankelDMDc, Powers, SlowSquares
 from seakeep.core.observables import slow_kernel, slow_squares
-from seakeep.models import HankelDMDc
-from seakeep.models.labelled import Span, channel_labels
-from seakeep.models.observables import Powers, SlowSquares
+from seakeep.models.labelled import ChannelLabel, Span, channel_labels
+from seakeep.models.terms import Bound
 
 PERIOD = 15  # samples
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
@@ -26,6 +28,32 @@ def rows(chain, run, first, stop):
     read = chain.reads(span)
     drive = chain.drive(values[read.first : read.stop], [span], run=run, first=read.first)
     return drive.rows(first, stop)
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Reads two samples before and one after, with the delays, and counts in periods."""
+
+    period: float | None = None
+    kind, delayed = "turned", True
+
+    def reach(self, dt):
+        return 2, 1
+
+    def bind(self, inputs, dt):
+        label = ChannelLabel("turned", "m", f"curved, {self.period / dt:.1f}")
+        return Bound(
+            (label,), lambda u: np.roll(u[:, :1], -1, axis=0) - np.roll(u[:, :1], 2, axis=0)
+        )
+
+
+def test_settings_need_what_a_delayed_observable_reads(drift):
+    spec = HankelDMDc(8, 12, 1.0, lead=5, observables=(Turned(),))
+    model = spec.fit(drift, ["surge"], INPUTS)
+    needs = spec.needs(DT)
+    assert (needs.history, needs.lead) == (14, 6)
+    assert (model.history_samples - 1, model.lead_samples) == (14, 6)
+    assert model.signature.input_map.columns.observables[0].period == pytest.approx(1.5, rel=0.2)
 
 
 def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():

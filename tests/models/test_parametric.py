@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
-from records import record, table
+from records import record, rms, table
+from said import data_error, request_error, warned
 from scipy import signal
 
-from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, check, load_model, tune
+from seakeep import HankelDMDc, check, load_model, tune
 from seakeep.hosts.program import exportable
 from seakeep.models import specs
 from seakeep.models.engine import read_groups
@@ -48,7 +49,7 @@ def family():
 def error(model):
     """Of a forecast at a draught between those of the family."""
     run = vessel(0.45, 40, 800)
-    return float(np.sqrt(((model.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
+    return rms(model.forecast(run, 5.0, 200).heave - run.heave[51:251])
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +137,7 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, family, monkeypat
 
 
 def test_a_check_takes_the_middle_of_the_training(model):
-    with pytest.warns(SeakeepWarning, match="the one in the middle of the training, "):
+    with warned("the one in the middle of the training, "):
         shown = check.response(model, [1.0])
     at_centre = model.at(parameter=model.variation.centre)
     xr.testing.assert_identical(shown, check.response(at_centre, [1.0]))
@@ -144,19 +145,19 @@ def test_a_check_takes_the_middle_of_the_training(model):
 
 def test_words(model):
     run = vessel(0.7, 3)
-    with pytest.raises(RequestError, match=r"does not state the parameter rig\.draught"):
+    with request_error(r"does not state the parameter rig\.draught"):
         model.forecast(run.assign_attrs(rig={}), 5.0, 10)
-    with pytest.warns(SeakeepWarning, match="lies outside the 0 to 1 of the training"):
+    with warned("lies outside the 0 to 1 of the training"):
         model.forecast(run.assign_attrs(rig={"draught": 1.2}), 5.0, 10)
-    with pytest.raises(RequestError, match=r"model\.at\(parameter=…\)"):
+    with request_error(r"model\.at\(parameter=…\)"):
         model.live()
-    with pytest.raises(RequestError, match=r"varies with rig\.draught\. Export it at a value"):
+    with request_error(r"varies with rig\.draught\. Export it at a value"):
         exportable(model)
     at_centre = model.at(parameter=model.variation.centre).summary().splitlines()
     assert model.summary().splitlines()[-2:] == at_centre[-2:]
-    with pytest.raises(RequestError, match="does not vary with a parameter"):
+    with request_error("does not vary with a parameter"):
         model.at(parameter=0.5).at(parameter=0.5)
-    with pytest.raises(DataError, match=r"all runs have rig\.draught = 0\.7"):
+    with data_error(r"all runs have rig\.draught = 0\.7"):
         SPEC.fit([run, vessel(0.7, 4)], *CHANNELS)
-    with pytest.raises(RequestError, match="parameter takes delay_rows = 'exact'"):
+    with request_error("parameter takes delay_rows = 'exact'"):
         replace(SPEC, delay_rows="ridge")

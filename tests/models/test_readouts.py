@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_run
 from drifting import STATES as MOTIONS
 from ensembles import few
@@ -12,9 +11,11 @@ from moored import FLOOR, NOISE, moored_run, moored_runs
 from moored import INPUTS as ETA
 from moored import STATES as MOORED
 from numpy.testing import assert_allclose, assert_array_equal
-from records import table
+from records import rms, table
+from said import request_error
+from xarray.testing import assert_identical
 
-from seakeep import HankelDMDc, RequestError
+from seakeep import HankelDMDc
 from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
@@ -50,7 +51,7 @@ def kinds(model):
 
 def error(model, run):
     found = model.forecast(run, START, STEPS)
-    return float(np.sqrt(np.mean((found - run.sel(time=found["time"]))["mooring_bow"] ** 2)))
+    return rms((found - run.sel(time=found["time"]))["mooring_bow"])
 
 
 def test_the_line_and_its_load_are_recovered_to_the_noise(chosen, drift):
@@ -61,7 +62,7 @@ def test_the_line_and_its_load_are_recovered_to_the_noise(chosen, drift):
     windows = chosen.read_windows(drift, [START], STEPS)
     measured = table(drift, STATES)[601 : 601 + STEPS]
     found = line.read(measured, windows.waves[0, :, 0])
-    left = float(np.sqrt(np.mean((found - measured[:, 2]) ** 2)))
+    left = rms(found - measured[:, 2])
     assert LOAD_NOISE * 0.9 < left < LOAD_NOISE * 1.5
 
 
@@ -82,7 +83,7 @@ def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
     linear = SPEC.fit(runs, STATES, INPUTS)
     assert chosen.signature.readouts[0].kind == "wave"
     assert error(chosen, drift) < 0.5 * error(linear, drift)
-    xr.testing.assert_identical(
+    assert_identical(
         chosen.forecast(drift, START, STEPS)[MOTIONS], linear.forecast(drift, START, STEPS)[MOTIONS]
     )
     summary = chosen.summary()
@@ -98,7 +99,7 @@ def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
         dry[name] = run.assign(mooring_bow=(load + LOAD_NOISE * noise).assign_attrs(units="N"))
     model = replace(SPEC, readouts="auto").fit(dry, STATES, INPUTS)
     assert kinds(model) == ["none"]
-    xr.testing.assert_identical(
+    assert_identical(
         model.forecast(drift, START, STEPS),
         SPEC.fit(dry, STATES, INPUTS).forecast(drift, START, STEPS),
     )
@@ -131,7 +132,7 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
     assert FLOOR - 3 * NOISE < stern.floor < FLOOR
     assert f"mooring_stern: none, floor {stern.floor:.4g} N" in model.summary()
     assert_array_equal(load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor))
-    xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
+    assert_identical(load["mooring_bow"], linear["mooring_bow"])
     taut = moored(spec, slack=False)
     assert not any(each.acts for each in taut.signature.readouts)
     ensemble = moored(few(readouts="auto"))
@@ -145,7 +146,7 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
 def test_no_linear_system_stands_for_it(tmp_path):
     model = moored(replace(PLAIN, readouts="auto"))
     for export in (model.to_state_space, lambda: model.to_mat(tmp_path / "m.mat")):
-        with pytest.raises(RequestError, match=r"reads mooring_stern off .* readouts = \{\} in"):
+        with request_error(r"reads mooring_stern off .* readouts = \{\} in"):
             export()
     without = moored(replace(PLAIN, readouts={}))  # as the message says
     assert without.to_state_space().C.shape[0] == len(MOORED)

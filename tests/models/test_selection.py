@@ -11,14 +11,14 @@ from drifting import drifting_run
 from free_runs import loop_score
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record
+from said import data_error
 from scipy import signal
 from squared import DT, INPUTS, PERIOD, STATES, runs
 
-from seakeep import DataError, HankelDMDc, ProbeAlignment
+from seakeep import HankelDMDc, ProbeAlignment, Select
 from seakeep.models.candidates import default_observables
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, Problem, groups_of, select
-from seakeep.models.settings import Select
 
 SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
 
@@ -105,7 +105,7 @@ def test_periods_are_counted_in_the_first_elevation():
     assert mean_period({"a": run}, ["wind", "gauge"]) == pytest.approx(2.5 / DT, rel=1e-3)
     stated = run.assign_attrs(encounter_period=1.5)
     assert mean_period({"still": still, "b": stated}, [*periods]) == pytest.approx(15)
-    with pytest.raises(DataError, match=r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
+    with data_error(r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
         mean_period({"a": run}, ["wind"])
 
 
@@ -183,7 +183,7 @@ def test_the_parts_of_a_single_run_are_those_of_its_training_window(history):
     assert "3 parts held out in turn" in of_window.note
     assert of_window.settings.window == window
     scores = [[row["score"] for row in each.rows] for each in (of_window, of_late)]
-    np.testing.assert_allclose(*scores, rtol=1e-9)
+    assert_allclose(*scores, rtol=1e-9)
 
 
 def growing(seed):

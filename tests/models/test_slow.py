@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from records import record
+from said import warned
 
-from seakeep import SeakeepWarning
 from seakeep.models.validity import slow_motions, warn_of_slow_motions
 
 DT, PERIOD = 0.1, 1.64
@@ -43,7 +43,7 @@ def test_a_regular_drift_is_counted_exactly():
 def test_few_periods_warn_and_enough_do_not(seed):
     runs = {"a": run_of(seed, 210), "b": run_of(seed + 100, 210)}
     # The paper's window of 20 T in one run: about one slow period.
-    with pytest.warns(SeakeepWarning, match=r"32\.8 s in all, hold (0|1)\.\d periods .* surge"):
+    with warned(r"32\.8 s in all, hold (0|1)\.\d periods .* surge"):
         warn_of_slow_motions({"a": runs["a"]}, ["surge", "heave"], 32.8, PERIOD)
     warn_of_slow_motions(runs, ["surge", "heave"], 420.0, PERIOD)
 

@@ -8,8 +8,9 @@ from ensembles import few
 from numpy.testing import assert_allclose, assert_array_equal
 from oscillators import Oscillator
 from records import record
+from said import warned
 
-from seakeep import HankelDMDc, SeakeepWarning, load_model
+from seakeep import HankelDMDc, load_model
 
 
 def growing(factor=1.5, samples=60, scale=1.0):
@@ -75,7 +76,7 @@ def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stabl
     spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
     unclipped = spec.fit(run, ["heave"], ["eta_fwd"])
     words = r"is 1\.\d+: a free run grows by [45]\d % per step in .* or set stable = True\."
-    with pytest.warns(SeakeepWarning, match=words):
+    with warned(words):
         grows = unclipped.eigenvalues
     assert "UNSTABLE" in unclipped.summary()
     model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from drifting import DT, FOLLOWED, INPUTS, drifting_run
 from numpy.testing import assert_allclose
 from records import table
+from said import data_error
+from xarray.testing import assert_identical
 
 from seakeep import (
     BayesianHankelDMDc,
-    DataError,
     HankelDMDc,
     LogUniform,
     Powers,
@@ -128,7 +128,7 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
             assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
     again = load_model(ensemble.save(tmp_path / "e.nc"))
     for same in (again, ensemble.hold()):
-        xr.testing.assert_identical(forecast_of(same, run), found)
+        assert_identical(forecast_of(same, run), found)
 
 
 def test_a_forecast_reads_its_history_and_look_ahead_and_nothing_else(model, run, expected):
@@ -138,10 +138,10 @@ def test_a_forecast_reads_its_history_and_look_ahead_and_nothing_else(model, run
     for name in ("heave", "mooring_bow") if reads_surge(model) else (*STATES, *INPUTS):
         poisoned[name].values[(START if name in STATES else last) + 1 :] = np.nan
         poisoned[name].values[:first] = np.nan
-    xr.testing.assert_identical(forecast_of(model, poisoned), expected)
+    assert_identical(forecast_of(model, poisoned), expected)
     gone = run.copy(deep=True)
     gone[INPUTS[0]].values[last] = np.nan  # which it does read
-    with pytest.raises(DataError, match="missing"):
+    with data_error("missing"):
         forecast_of(model, gone)
 
 
@@ -158,7 +158,7 @@ def test_training_reads_its_window_and_nothing_else(runs, run, model, expected):
 
 def test_files_and_tables_of_settings_hold_it_all(model, run, expected, tmp_path):
     again = load_model(model.save(tmp_path / "m.nc"))
-    xr.testing.assert_identical(forecast_of(again, run), expected)
+    assert_identical(forecast_of(again, run), expected)
     assert again.summary() == model.summary()
     assert again.settings == model.settings
     table = json.loads(json.dumps(model.settings.to_json()))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 from scipy import signal
 
@@ -61,6 +61,7 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, d
     start, steps = 100, 150
     x, u = table(run, STATES), table(run, INPUTS)
     state = model.initial_state_arrays(x[: start + 1], u[: start + 1])
+    assert_array_equal(model.initial_state(run, float(run.time[start])), state)
     system = model.to_state_space()
     assert system.dt == model.dt
     assert len(system.A) == 2 * (s + 1) + 2 * z

@@ -145,7 +145,7 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
         (lower,) = (line for line in axes.lines if line.get_label() == "calibrated")
         wider = one["mean"] - at["margin"] * np.hypot(one["std"], at["floor"])
         expected = (wider - one["training_mean"]) / one["training_std"]
-        np.testing.assert_allclose(lower.get_ydata(), expected, rtol=1e-10)
+        assert_allclose(lower.get_ydata(), expected, rtol=1e-10)
     plain = history_figure(without(result, "calibration"), test, training, window)
     for drawn, shown in ((figure, True), (plain, False)):
         texts = [text.get_text() for text in drawn.legends[0].get_texts()]

@@ -7,7 +7,7 @@ import pytest
 from records import record
 from small_tank import CAMPAIGN, tank_columns, write_csv
 
-from seakeep.campaign import read_campaign
+from seakeep import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
 from seakeep.quality.samples import SamplesKind
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from seakeep.errors import RequestError
+from seakeep import RequestError
 from seakeep.signals.expressions import parse
 
 A, B = np.array([1.0, 2.0, 6.0]), np.array([4.0, -1.0, 0.5])

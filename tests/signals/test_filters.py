@@ -17,6 +17,7 @@ from seakeep.signals import (
     low_pass,
     lowpass_taps,
 )
+from seakeep.signals.calculus import expected_in_gaps
 
 DT = 0.01
 T = np.arange(0, 80, DT)
@@ -78,6 +79,19 @@ def test_derivative_of_a_quartic_is_exact():
     # Fourth order, at the ends too; rounding of T⁴ = 4e7 over dt.
     t = np.arange(0, 2, 0.1)
     assert_allclose(differentiate(t**4 - t, 0.1), 4 * t**3 - 1, atol=1e-11)
+
+
+def test_gaps_have_the_waves_that_are_expected():
+    t = np.arange(0, 60, 0.05)
+    waves = np.cos(np.outer(t, np.linspace(0.7, 1.6, 12)) + np.arange(12.0) ** 2).sum(axis=1)
+    for length in (8.0, 20.0):
+        lost = (t >= 30) & (t < 30 + length)
+        filled = expected_in_gaps(np.where(lost, 0.0, waves), lost)
+        assert_allclose(filled[~lost], waves[~lost], atol=1e-12)
+        if length == 8.0:
+            assert np.abs(filled - waves).max() < 0.01 * waves.std()
+        # In 20 s of 60 s what fits either side best is 68 times as high.
+        assert np.abs(filled).max() < 1.01 * np.abs(waves).max()
 
 
 def test_envelope_of_a_group():

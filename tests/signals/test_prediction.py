@@ -7,6 +7,7 @@ import pytest
 import seas
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
+from records import rms
 from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
@@ -120,7 +121,7 @@ def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
     claimed = np.sqrt(np.cumsum((found.departures**2).sum(axis=0), axis=0)) / spread
     for column, x in ((1, 2.0), (2, 4.0)):
         known = int(predictable_time(sea[:900, 0], 0.1, x, 3.6) / 0.1)
-        error, own = (np.sqrt(np.mean(each[:known, column] ** 2)) for each in errors)
+        error, own = (rms(each[:known, column]) for each in errors)
         # Noise of two probes, 0.03, and the twentieth of the variance that is faster.
         assert error < 0.05
         assert error < 0.6 * own
@@ -143,7 +144,7 @@ def test_departures_of_a_sea_are_the_errors_of_its_prediction():
     ratio = (seas[400:] - found.expected).T / np.sqrt(np.cumsum(own**2, axis=1))
     # These seas tell the root to 2 %. Errors of 62 coefficients in 400 samples count as those of
     # one step do, to first order; without them the root is 15 % larger.
-    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, rel=0.1)
+    assert rms(ratio) == pytest.approx(1.0, rel=0.1)
     assert 4 < found.freedom < 400 / 62  # of the largest order
 
 

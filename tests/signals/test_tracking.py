@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
+from records import rms
 from said import data_error, request_error
 from small_tank import write_csv
 
@@ -88,10 +89,6 @@ def tracked(plain):
     out = track_video(plain[0], progress=lambda *said: reports.append(said))
     assert reports == [(FRAMES, FRAMES, "frames")]
     return out
-
-
-def rms(values):
-    return float(np.sqrt(np.mean(np.asarray(values) ** 2)))
 
 
 def centroid_error(tracked, place):

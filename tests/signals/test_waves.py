@@ -30,6 +30,8 @@ def test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not():
     wave = np.sin(6.0 * t) + 0.5 * np.sin(12.0 * t) + 0.2 * np.sin(18.0 * t)
     assert is_regular(np.clip(t / 15 - 1, 0, 1) * wave)  # still for a quarter, then a ramp
     assert not is_regular(wave + 0.7 * np.sin(7.0 * t))
+    for seed in range(5):  # eight waves or so
+        assert not is_regular(sea(seed, band=(0.38, 0.7)).at(np.arange(0, 16, 0.02)))
     narrow = sea(0, band=(0.7, 1.3), peak=1.1)
     assert not is_regular(narrow.at(np.arange(0, 100, 0.02)))
 

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import default_rng
+from said import warned
 from scipy.signal import lfilter
 
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep import DataError, RequestError
 from seakeep.statistics import block_length, lag_one_correlation, moving_block_bootstrap
 
 
 def autoregressive(phi, samples, seed):
-    noise = np.random.default_rng(seed).standard_normal(samples + 500)
+    noise = default_rng(seed).standard_normal(samples + 500)
     return lfilter([1.0], [1.0, -phi], noise)[500:]
 
 
@@ -54,9 +56,9 @@ def test_politis_white_agrees_with_arch(phi):
 
 def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
     slow = np.cos(np.linspace(0, np.pi, 400))
-    with pytest.warns(SeakeepWarning, match=r"rule 'carlstein' asks for blocks of .* cut to 100"):
+    with warned(r"rule 'carlstein' asks for blocks of .* cut to 100"):
         assert block_length(slow) == 100
-    with pytest.warns(SeakeepWarning, match="cut to 60"):  # the shortest segment
+    with warned("cut to 60"):  # the shortest segment
         assert block_length(slow, segments=[140, 60, 200]) == 60
 
 
@@ -73,8 +75,8 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
 def test_length_and_values_are_kept_and_blocks_run_on(samples, data, n_series, seed):
     length = data.draw(st.integers(1, samples))
     x = np.arange(samples, dtype=float)
-    drawn = moving_block_bootstrap(x, n_series, length, np.random.default_rng(seed))
-    again = moving_block_bootstrap(x, n_series, length, np.random.default_rng(seed))
+    drawn = moving_block_bootstrap(x, n_series, length, default_rng(seed))
+    again = moving_block_bootstrap(x, n_series, length, default_rng(seed))
     assert drawn.shape == (n_series, samples)
     assert np.isin(drawn, x).all()
     assert np.array_equal(drawn, again)
@@ -84,7 +86,7 @@ def test_length_and_values_are_kept_and_blocks_run_on(samples, data, n_series, s
 
 def test_no_block_crosses_a_join_of_segments():
     which = np.repeat([0.0, 1.0, 2.0], [20, 30, 12])
-    drawn = moving_block_bootstrap(which, 200, 12, np.random.default_rng(0), segments=[20, 30, 12])
+    drawn = moving_block_bootstrap(which, 200, 12, default_rng(0), segments=[20, 30, 12])
     blocks = drawn[:, :60].reshape(200, 5, 12)
     assert np.all(blocks == blocks[..., :1])
     assert set(np.unique(blocks)) == {0.0, 1.0, 2.0}
@@ -92,11 +94,11 @@ def test_no_block_crosses_a_join_of_segments():
 
 # --- what is refused -----------------------------------------------------------------------------
 
-NOISE = np.random.default_rng(0).standard_normal(100)
+NOISE = default_rng(0).standard_normal(100)
 
 
 def redrawn(length, segments=None):
-    return moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0), segments=segments)
+    return moving_block_bootstrap(NOISE, 3, length, default_rng(0), segments=segments)
 
 
 @pytest.mark.parametrize(

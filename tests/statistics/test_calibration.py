@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal, stats
 
@@ -29,7 +30,7 @@ def test_margins_by_hand():
 
 
 def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     held, plain, worth = [], [], []
     for _ in range(400):
         noise = np.sqrt(1 - 0.95**2) * rng.standard_normal((6, 200, 1))
@@ -49,7 +50,7 @@ def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
 
 def learnable(windows, steps, seed):
     """Errors whose scale goes with the spread, with the waves, and grows over the horizon."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     envelope = np.exp(rng.normal(0.0, 0.5, (windows, steps)))
     std = np.exp(rng.normal(0.0, 0.5, (windows, steps, 1)))
     horizon = (1.0 + np.arange(steps))[:, None]
@@ -69,7 +70,7 @@ def test_a_learnt_scale_is_the_one_that_the_errors_have():
 
 
 def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
-    rng, zeros = np.random.default_rng(4), np.zeros((8, 50, 1))
+    rng, zeros = default_rng(4), np.zeros((8, 50, 1))
     errors = [spread * rng.standard_normal(zeros.shape) for spread in (1.0, 3.0)]
     values = np.stack([zeros, zeros + 1, zeros, zeros], axis=1)
     found, *_ = learn_margin([Judged(values, y, np.ones((8, 50))) for y in errors], 0.95, "learnt")
@@ -79,7 +80,7 @@ def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
 
 
 def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
-    rng = np.random.default_rng(5)
+    rng = default_rng(5)
     waves, z, steps = rng.standard_normal((2, 12, 3)), 4, 8
     found = wave_envelope(waves, steps)
     for step in range(steps):
@@ -114,7 +115,7 @@ def test_scores_by_hand_and_a_band_that_is_lost():
 
 def test_the_block_is_the_integrated_correlation_time():
     """Exceedances of a score that is held for k samples: 1 + 2 Σ (1 − j/k) = k."""
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     scores = np.stack([np.repeat(rng.standard_normal(500), 8) for _ in range(20)])[..., None]
     found = conformal_margin(scores, 0.9).block_length[0]
     assert found == pytest.approx(8, rel=0.1)  # the first correlations beyond 8 are noise of 1 %

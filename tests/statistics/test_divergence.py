@@ -5,6 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.random import default_rng
 from scipy.signal import lfilter
 from scipy.spatial.distance import jensenshannon
 
@@ -14,7 +15,7 @@ from seakeep.statistics import density_grid, jensen_shannon, jsd_interval, kerne
 
 
 def wave_like(samples, seed):
-    noise = np.random.default_rng(seed).standard_normal(samples + 500)
+    noise = default_rng(seed).standard_normal(samples + 500)
     radius, angle = 0.95, 2 * np.pi / 32
     return lfilter([1.0], [1.0, -2 * radius * np.cos(angle), radius**2], noise)[500:]
 
@@ -23,7 +24,7 @@ MEASURED = wave_like(2400, 1)
 
 
 def judged(predicted, **settings):
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     return jsd_interval(predicted, MEASURED, block_length=50, rng=rng, **settings)
 
 
@@ -52,10 +53,8 @@ def test_masses_near_the_smallest_number_do_not_vanish():
 def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks(monkeypatch, most):
     monkeypatch.setattr(density, "MOST_BINS", most)
     predicted = np.stack([0.9 * MEASURED, MEASURED + 0.3])
-    found = jsd_interval(
-        predicted, MEASURED, block_length=50, n_series=5, rng=np.random.default_rng(7)
-    )
-    positions = bootstrap_indices(MEASURED.size, 5, 50, np.random.default_rng(7))
+    found = jsd_interval(predicted, MEASURED, block_length=50, n_series=5, rng=default_rng(7))
+    positions = bootstrap_indices(MEASURED.size, 5, 50, default_rng(7))
     grid = density_grid(predicted, MEASURED)
     for model in range(2):
         for draw in range(5):
@@ -66,9 +65,8 @@ def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks(monke
             assert found.draws[model, draw] == pytest.approx(
                 float(jensenshannon(p, q)) ** 2, rel=1e-4
             )
-    assert found.mean == pytest.approx(found.draws.mean(), rel=1e-14)
-    assert found.lower == pytest.approx(np.quantile(found.draws, 0.025), rel=1e-14)
-    assert found.upper == pytest.approx(np.quantile(found.draws, 0.975), rel=1e-14)
+    expected = found.draws.mean(), *np.quantile(found.draws, [0.025, 0.975])
+    assert (found.mean, found.lower, found.upper) == pytest.approx(expected, rel=1e-14)
     assert found.uncertainty == found.upper - found.lower
 
 

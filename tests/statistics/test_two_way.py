@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from seakeep.statistics import overlap_block, two_way_interval
 
@@ -23,7 +24,7 @@ def table(rng, row, column, cell, overlap=1):
 
 
 def coverage(row, column, cell, overlap=1, blocks=(1, 1)):
-    rng, inside = np.random.default_rng(0), 0
+    rng, inside = default_rng(0), 0
     for _ in range(TRIALS):
         pair = (table(rng, row, column, cell, overlap) for _ in range(2))
         low, high = two_way_interval(
@@ -44,7 +45,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(row, column, cell, ove
 
 
 def test_pairs_are_kept_and_further_axes_too():
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     errors = rng.normal(1.0, 0.3, (6, 8, 2))
     low, high = two_way_interval(mean_of_difference, errors + 0.5, errors, rng=rng)
     np.testing.assert_allclose([low, high], 0.5)  # the same cells on both sides: no spread at all
@@ -52,7 +53,7 @@ def test_pairs_are_kept_and_further_axes_too():
 
 
 def test_cells_that_are_not_judged_are_left_out():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     errors = rng.normal(1.0, 0.1, (3, 30))
     errors[np.arange(30) % 3 != np.arange(3)[:, None]] = np.nan  # runs are left out in turn
     low, high = two_way_interval(lambda x: np.nanmean(x, axis=(1, 2)), errors, rng=rng)
@@ -60,7 +61,7 @@ def test_cells_that_are_not_judged_are_left_out():
 
 
 def test_too_few_blocks_give_no_interval_and_one_cell_is_conditioned_on():
-    rng = np.random.default_rng(3)
+    rng = default_rng(3)
     errors = rng.normal(1.0, 0.1, (2, 30))
     mean = lambda x: x.mean(axis=(1, 2))  # noqa: E731
     assert np.isnan(two_way_interval(mean, errors, rng=rng)).all()
@@ -77,11 +78,11 @@ def test_blocks_are_as_long_as_windows_overlap():
 
 def test_neighbours_are_drawn_together():
     """Rows in pairs of one value each: drawn two by two their mean scatters √2 times as far."""
-    rows = np.repeat(np.random.default_rng(0).normal(size=20), 2)[:, None] * np.ones((1, 1))
+    rows = np.repeat(default_rng(0).normal(size=20), 2)[:, None] * np.ones((1, 1))
     widths = []
     for block in (1, 2):
         low, high = two_way_interval(
-            lambda drawn: drawn.mean(axis=(1, 2)), rows, rng=np.random.default_rng(1),
+            lambda drawn: drawn.mean(axis=(1, 2)), rows, rng=default_rng(1),
             blocks=(block, 1), n_series=4000,
         )  # fmt: skip
         widths.append(float(high - low))

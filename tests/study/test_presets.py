@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import pytest
 from pages import page
 
-from seakeep import Uniform
-from seakeep.campaign import read_campaign
+from seakeep import Uniform, read_campaign
 from seakeep.campaign.settings import is_elevation
 from seakeep.signals.waves import paper_welch
 from seakeep.study import judge, read_study

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.errors import SeakeepWarning
+from seakeep import SeakeepWarning
 from seakeep.report.tables import MISSING
 from seakeep.study import read_study
 from seakeep.study.plan import make_plan

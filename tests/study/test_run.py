@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
-from seakeep.errors import DataError, RequestError
+from seakeep import DataError, RequestError
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run_study
@@ -68,11 +68,6 @@ def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_cha
     assert_allclose(at["level"], error.mean("time"), rtol=1e-12)
 
 
-def test_arrays_do_not_depend_on_workers(study_folder, finished):
-    study = read_study(study_folder / "study.toml")
-    assert_same(finished, run_study(study, study_folder / "alone"))
-
-
 def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, finished):
     study, out, told = read_study(study_folder / "study.toml"), study_folder / "stopped", []
 
@@ -103,7 +98,7 @@ def test_one_process_works_in_a_folder(study_folder, finished):
                 run_study(study, out)
             refused.append(what)
 
-    assert_same(finished, run_study(study, out, progress=second))
+    assert_same(finished, run_study(study, out, progress=second))  # without workers
     assert refused
     assert not (out / LOCK).exists()
     told = []

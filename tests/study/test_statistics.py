@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from cells import cells
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from said import warned
 from tutorial_study import STUDY, put_tutorial
@@ -204,7 +205,7 @@ def crossed(rng, levels):
 
 
 def test_differences_between_models_have_intervals_and_verdicts():
-    rng = np.random.default_rng(0)
+    rng = default_rng(0)
     test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
     noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
     test["error"].loc[{"model": "noisy", "measure": "nrmse"}] *= noise
@@ -238,7 +239,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
     """Windows and channels grow differently, by SDs of 0.2; 100 tables of nine windows of ten."""
     growth, inside, changes = 0.5, 0, []
     for seed in range(100):
-        rng = np.random.default_rng(seed)
+        rng = default_rng(seed)
         test = crossed(rng, {"m": 1.0}).isel(channel=[0] * 9)
         windows, channels = rng.normal(0, 0.2, (10, 1)), rng.normal(0, 0.2, 9)
         grows = np.broadcast_to(growth + windows + channels, (1, 1, 10, 10, 9)).copy()
@@ -259,7 +260,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
 
 
 def test_medians_leave_out_what_is_not_judged():
-    rng = np.random.default_rng(1)
+    rng = default_rng(1)
     cells = rng.standard_normal((3, 8, 2))
     cells[0, :5], cells[1] = np.nan, np.nan
     found = median_of(cells)

@@ -5,9 +5,8 @@ import pytest
 import xarray as xr
 from said import request_error
 
-from seakeep.study import read_study
+from seakeep.study import StudySettings, read_study
 from seakeep.study.plan import Needs, choose_tests, choose_training, windows_overlap
-from seakeep.study.settings import StudySettings
 from seakeep.toml import validated
 
 DT = 0.1

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from said import request_error
 
-from seakeep.campaign import read_campaign
+from seakeep import read_campaign
 from seakeep.tank.play import check_settings, play, truth
 from seakeep.tank.settings import SpectrumSettings
 

@@ -25,6 +25,7 @@ from seakeep.signals import (
     transfer_position,
     transfer_velocity,
 )
+from seakeep.signals.calculus import expected_in_gaps
 from seakeep.signals.expressions import parse
 from seakeep.waves import GRAVITY
 
@@ -90,13 +91,21 @@ def derive(
             if own.unit is not None:
                 conversion(unit, own.unit, label)
         target = units_of(name, unit)
-        values = values * conversion(unit, target, label)
+        factor = conversion(unit, target, label)
+        sources = sources_of(name, own, channels)
+        units = [channels[source].attrs["units"] for source in sources]
+        if own.expression and factor != 1 and target in units:
+            raise RequestError(
+                f"{own.expression!r} is computed from channels in SI units, some in '{target}', so "
+                f"that its result can hardly be in '{unit}'. State unit = '{target}', and leave "
+                "out of the expression what converts units."
+            )
+        values = values * factor
     attributes = {
         "units": target,
         "long_name": long_name_of(name, own.long_name),
         "derived_from": origin,
     }
-    sources = sources_of(name, own, channels)
     if own.step in ("low_pass", "band_pass") and "accuracy" in channels[sources[0]].attrs:
         attributes["accuracy"] = channels[sources[0]].attrs["accuracy"]  # the same, in a band
     out = {name: xr.Variable("time", values, attributes)}
@@ -109,12 +118,20 @@ def derive(
     return out
 
 
+def _series(channels: Channels, name: str | None) -> FloatArray:
+    """Values of a channel; those expected in its gaps, because a filter reaches beyond them."""
+    values = channels[str(name)].values
+    if (flags := channels.get(f"{name}_flags")) is None:
+        return values
+    return expected_in_gaps(values, (flags.values & (MISSING | BRIDGED)) > 0)
+
+
 def _step(
     dataset: Channels, name: str, settings: DerivedSettings, dt: float
 ) -> tuple[FloatArray, str, str]:
     """Values and unit of a named step, and what it does to its source."""
-    source = dataset[str(settings.source)]
-    series, unit = source.values, str(source.attrs["units"])
+    series = _series(dataset, settings.source)
+    unit = str(dataset[str(settings.source)].attrs["units"])
     times, band = settings.times or 1, settings.band or (0.0, 0.0)
     passband, crossover = settings.passband or 0.0, settings.crossover or 0.0
     integrated = f"({unit}) * s^{times}"
@@ -132,7 +149,7 @@ def _step(
         case "envelope_squared":
             return envelope_squared(series, dt), si_unit(f"({unit})^2"), ""
         case "complementary_filter":
-            slow = dataset[str(settings.position)].values
+            slow = _series(dataset, settings.position)
             both = complementary_filter(slow, series, dt, crossover, times)
             words = f"integrated {times} time(s) above {crossover:g} Hz, {settings.position} below"
             return both, si_unit(integrated), words

@@ -219,8 +219,9 @@ class DerivedSettings(Table):
     """``[derived.NAME]``: a channel made from others, by an expression or by a named step."""
 
     expression: str | None = optional(
-        "such as '0.5*(acc_sb + acc_ps)', on SI values; knows + - * / **, square, abs, "
-        "sqrt, sin, cos, mean (over time) and average (of several channels)"
+        "such as '0.5*(acc_sb + acc_ps)', of channels in SI units and radians, whatever the "
+        "units of their columns; knows + - * / **, square, abs, sqrt, sin, cos, mean (over "
+        "time) and average (of several channels)"
     )
     source: str | None = Field(
         default=None, alias="from", description="the channel that the step works on"
@@ -250,7 +251,10 @@ class DerivedSettings(Table):
         "'remove_gravity': true where readings were set to zero at rest, false where "
         "the one along z reads +9.81 m/s^2 there"
     )
-    unit: str | None = optional("unit of the result; needed by expressions for free names")
+    unit: str | None = optional(
+        "unit of the number that the expression gives, so of angles 'rad'; needed for free "
+        "names; the channel itself is in SI units"
+    )
     long_name: str | None = optional("name for labels")
 
     @model_validator(mode="after")

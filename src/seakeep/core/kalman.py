@@ -6,6 +6,8 @@ rows of :math:`x_k`. The covariance depends on which rows were measured and on n
 may be run again later with the same gains, once a forcing f is known that was a guess before.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import linalg
 
@@ -107,15 +109,31 @@ class DelayFilter:
         Errors of each state are `raised` by a factor, shape (N,).
         """
         count, size = self.a.shape
-        factors = np.resize(raised, size)
-        covariance = self.covariance * np.outer(factors, factors)
-        out, reach = np.empty((steps, count)), self.a  # rows that carry them so far
-        for row in out:
+        factors = np.tile(raised, size // count)
+        covariance, out = self.covariance * np.outer(factors, factors), np.empty((steps, count))
+        for row, reach in zip(out, reaches(self.a), strict=False):
             np.einsum("ij,ij->i", reach @ covariance, reach, out=row)
-            on = reach[:, size - count :] @ self.a
-            on[:, count:] += reach[:, : size - count]
-            reach = on
         return out
+
+    def added_up(self, steps: int) -> FloatArray:
+        """Variances of free runs after `steps` steps, shape (N,), by the process noise alone."""
+        count = len(self.a)
+        out = np.diagonal(self.process).copy()
+        for _, reach in zip(range(steps - 1), reaches(self.a), strict=False):
+            newest = reach[:, -count:]
+            out += np.einsum("ij,ij->i", newest @ self.process, newest)
+        return out
+
+
+def reaches(a: FloatArray) -> Iterator[FloatArray]:
+    """Rows that carry a delayed state 1, 2, … steps ahead, each shape (N, N(s+1))."""
+    count, size = a.shape
+    reach = a
+    while True:
+        yield reach
+        on = reach[:, size - count :] @ a
+        on[:, count:] += reach[:, : size - count]
+        reach = on
 
 
 def process_noise(residual: FloatArray, a: FloatArray, noise: FloatArray) -> FloatArray:

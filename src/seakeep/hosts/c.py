@@ -107,7 +107,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
     follows, observed = input_map.follows, input_map.columns
-    (own, _), (before, _) = observed.reaches.tolist()
+    own, before = (observed.reach(delayed=each)[0] for each in (True, False))
     back = max(follows.back if follows else 0, own - input_map.lead, before)
     kernels: list[FloatArray] = []
     every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]

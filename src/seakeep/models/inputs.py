@@ -73,7 +73,8 @@ class InputMap:
     @cached_property
     def _around(self) -> tuple[int, int, int]:
         """Samples that rows read: before those with delays, before those without, after both."""
-        (back, ahead), (before, later) = self.columns.reaches.tolist()
+        back, ahead = self.columns.reach(delayed=True)
+        before, later = self.columns.reach(delayed=False)
         ahead += self.lead
         if self.follows is not None:
             back = max(self.follows.back, self.follows.place.taps.size - 1)

@@ -36,6 +36,7 @@ from seakeep.arrays import (
     undefined,
     whole_number,
 )
+from seakeep.conventions import is_elevation
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.core.recursion import read_row
 from seakeep.errors import RequestError, did_you_mean
@@ -229,7 +230,9 @@ class Live:
         process = process_noise(errors.residual, self._a, variances)
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
         self._deviations = np.sqrt(np.diagonal(process) + variances)  # after complete samples
-        self._raised = np.where(variances > 0, 1.0, _raised(self._filter, errors))
+        # Errors of a model last, and those of the filter do not.
+        excess = errors.rms[-1] / np.sqrt(np.maximum(self._filter.added_up(len(errors.rms)), TINY))
+        self._raised = np.where(variances > 0, 1.0, np.maximum(excess, 1.0))
         self._time = math.nan
         # Samples after an instant whose input is needed before its estimate is final.
         self._ahead = signature.lead_samples
@@ -293,14 +296,14 @@ class Live:
     def covariance(self) -> FloatArray:
         """Covariance of the errors of :attr:`state`, shape (N, N), but for those of lost waves.
 
-        While nothing is measured, the first step of a forecast holds these too. Errors of a model
-        last, which those of the filter do not: they are raised as far as free runs in training err
-        more than by errors that are independent in time, and are never above those of free runs.
+        While nothing is measured, the first step of a forecast holds these too. Those of a state
+        without stated noise are raised by the factor by which free runs in training err more than
+        white noise adds up to, but not above the errors of free runs.
         """
         count = len(self.signature.states)
         known = self._filter.covariance[-count:, -count:]
         most = self.errors.at(self._count.since) / np.sqrt(np.maximum(np.diagonal(known), TINY))
-        factor = np.minimum(self._raised, most)
+        factor = np.minimum(self._raised, np.maximum(most, 1.0))
         return known * np.outer(factor, factor)
 
     @property
@@ -384,8 +387,8 @@ class Live:
     def _smoothest(self) -> FloatArray:
         """RMS of third differences of inputs and states at least; infinite where they may jump."""
         coverage, signature = self.model.coverage, self.signature
-        is_wave = np.isin(np.arange(len(signature.inputs)), self._waves)
-        is_wave &= np.isfinite(coverage.steepnesses)
+        elevations = [at for at in self._waves if is_elevation(signature.inputs[at])]
+        is_wave = np.isin(np.arange(len(signature.inputs)), elevations)
         moves = [label.units in MOTIONS for label in signature.state_labels]
         spread = np.concatenate([0.25 * coverage.heights, signature.state_scale.spread])
         is_smooth = np.concatenate([is_wave, moves]) & (spread > 0)
@@ -989,18 +992,6 @@ def load_live(model: Servable, path: str | Path) -> Live:
         )
     live._restore(content, dataset["values"].values)
     return live
-
-
-def _raised(known: DelayFilter, errors: LeadErrors) -> FloatArray:
-    """Errors of free runs at the longest lead over those that independent ones add up to.
-
-    Of each state, shape (N,); at least one.
-    """
-    count, process = len(known.a), known.process
-    one = DelayFilter(known.a, process, known.noise, np.zeros_like(known.covariance))
-    one.covariance[-count:, -count:] = process
-    reached = np.diagonal(process) + one.ahead(len(errors.rms) - 1, np.ones(count)).sum(axis=0)
-    return np.sqrt(np.maximum(errors.rms[-1] ** 2 / np.maximum(reached, TINY), 1.0))
 
 
 def held_samples(inside: BoolArray) -> IntArray:

@@ -16,7 +16,6 @@ from seakeep.arrays import (
     TINY,
     Datasets,
     FloatArray,
-    IntArray,
     check_choice,
     check_keys,
     names_of,
@@ -417,14 +416,14 @@ class Observed:
         )
         return delayed, direct
 
-    @cached_property
-    def reaches(self) -> IntArray:
-        """Samples before and after an instant that rows read with delays, and without; (2, 2)."""
-        out = np.zeros((2, 2), dtype=int)
-        for each in self.observables:
-            row = out[0 if each.delayed else 1]
-            np.maximum(row, each.reach(self.dt), out=row)
-        return out
+    def reach(self, *, delayed: bool) -> tuple[int, int]:
+        """Samples before and after an instant that rows with delays, or without, read."""
+        own = [
+            (0, 0),
+            *(each.reach(self.dt) for each in self.observables if each.delayed == delayed),
+        ]
+        before, after = zip(*own, strict=True)
+        return max(before), max(after)
 
     @cached_property
     def slopes(self) -> FloatArray:

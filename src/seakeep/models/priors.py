@@ -216,6 +216,8 @@ def prior_of(name: str, value: object) -> Prior | None:
         if "distribution" in value:
             return Distribution(**value)
         ((key, given),) = value.items()
+        if not isinstance(given, list | tuple):
+            raise TypeError
         return _OWN[key](*given)
     except RequestError as error:
         raise RequestError(f"{name}: {error}") from None
@@ -223,7 +225,7 @@ def prior_of(name: str, value: object) -> Prior | None:
         raise RequestError(
             f"{name}: a prior is one of {{ uniform = [a, b] }}, {{ log_uniform = [a, b] }}, "
             "{ distribution = 'name', parameters = { … } }; received "
-            f"{value!r:.{SHOWN}}."
+            f"{value!r:.{SHOWN}}. A single value stands as it is: {name} = 5."
         ) from None
 
 

@@ -101,7 +101,7 @@ class Observable(Protocol):
     """Functions of the inputs; frozen, with fields that are JSON values.
 
     The columns take the input delays of the model where it is `delayed`, and stand as they are
-    elsewhere. A field ``period`` that is None becomes the encounter period of the runs, s.
+    otherwise. A field ``period`` that is None becomes the encounter period of the runs, s.
     """
 
     kind: ClassVar[str]

@@ -736,7 +736,8 @@ def _analytic(series: FloatArray) -> ComplexArray:
 def is_regular(series: ArrayLike) -> bool:
     """Whether one wave and its harmonics hold most of a record's variance."""
     power = tapered_power(as_series(series, minimum=8))[1:]
-    number = 1 + np.arange(power.size)  # waves in the record
-    peak = number[np.argmax(power)]
-    off = np.abs(number - peak * np.clip(np.round(number / peak), 1, 3))
-    return bool(power[off < max(0.1 * peak, 2.5)].sum() > ONE_WAVE * power.sum())
+    cycles = 1 + np.arange(power.size)  # in the record
+    peak = cycles[np.argmax(power)]
+    off = np.abs(cycles - peak * np.clip(np.round(cycles / peak), 1, 3))
+    near = off < max(0.1 * peak, 1.5)  # a taper spreads a wave over three lines
+    return bool(power[near].sum() > ONE_WAVE * power.sum())

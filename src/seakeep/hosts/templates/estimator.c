@@ -629,9 +629,9 @@ const double *{{ name }}_estimated(const {{ name }}_estimator *e) { return e->x 
 
 double {{ name }}_deviation(const {{ name }}_estimator *e, int state)
 {
-    int since = e->since < 1 ? LEADS : e->since < LEADS ? e->since : LEADS;
-    double most = errors[(since - 1) * N + state];
-    return fmin(raised[state] * sqrt(P(OLD + state, OLD + state)), most);
+    int since = e->since < 1 ? 1 : e->since < LEADS ? e->since : LEADS;
+    double own = sqrt(P(OLD + state, OLD + state));
+    return fmax(own, fmin(raised[state] * own, errors[(since - 1) * N + state]));
 }
 
 static int is_given(const double *future, int at, int q)

@@ -77,7 +77,8 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
 
 def _spans_decades(cells: FloatArray) -> bool:
     """Whether the channels' medians differ by so much that a common axis would hide most."""
-    known = cells[:, np.isfinite(cells).any(axis=0)]
+    finite = np.where(np.isfinite(cells), cells, np.nan)
+    known = finite[:, np.isfinite(cells).any(axis=0)]
     medians = np.nanmedian(known, axis=0)
     return bool(known.size and medians.max() > DECADE * np.median(medians))
 
