@@ -545,8 +545,7 @@ def _on_axis(run: Run, group: xr.Dataset, wanted: FloatArray, dt: float) -> dict
     """Channels of a logger and their flags at other instants."""
     time, settings = group["time"].values, run.settings.preparation
     own = uniform_step(time, f"run '{run.name}'")
-    channels = {name: group.variables[name] for name in group.data_vars}
-    series = np.column_stack([channel.values for channel in channels.values()])
+    series = np.column_stack([channel.values for channel in group.data_vars.values()])
     low, filtered = settings.low_pass, {}
     if low and low[1] < 0.5 / own:
         length = 60 / (14.36 * (low[1] - low[0]))  # of 60 dB, by Kaiser's formula
@@ -564,8 +563,8 @@ def _on_axis(run: Run, group: xr.Dataset, wanted: FloatArray, dt: float) -> dict
     else:
         series = series[: wanted.size]
     out = {
-        str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
-        for i, (name, channel) in enumerate(channels.items())
+        str(name): xr.Variable("time", series[:, i].copy(), channel.attrs | filtered)
+        for i, (name, channel) in enumerate(group.data_vars.items())
     }
     # Flags at new instants: what any sample within half a new step of them carries.
     half = 0.5 * max(dt, time[1] - time[0]) * (1 + 1e-9)

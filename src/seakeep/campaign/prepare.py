@@ -482,11 +482,10 @@ class Campaign:
             "probe_offset": settings.probe_offset,
             **celerity_of(run, dt),
         }
-        whole = (time[0], time[-1])
         for use in ("train", "test"):
             span = run.span(use)
             if not span and settings.serves == use:
-                span = whole
+                span = time[0], time[-1]
             if span:
                 used = time[inside(time, span, dt)]
                 if used.size:

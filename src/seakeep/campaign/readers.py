@@ -149,9 +149,8 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
 
 def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
     """Unit of a time column: as stated, as its header says, as its name ends, or seconds."""
-    said = _said_unit(table, name)
     named = named_unit(name)[1]
-    return stated or said or (named if named and si_unit(named) == "s" else "s")
+    return stated or _said_unit(table, name) or (named if named and si_unit(named) == "s" else "s")
 
 
 def _said_unit(table: Columns, name: str) -> str:

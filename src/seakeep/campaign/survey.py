@@ -177,8 +177,9 @@ def survey(
     doubts = {name: each[2] for name, each in counted.items()}
     if bad and (not clocks or (period_runs and not counted)):
         raise as_one(bad)
-    for words in (words for name, words in left_out.items() if name not in asked):
-        warn(words)
+    for name, words in left_out.items():
+        if name not in asked:
+            warn(words)
     warn_of(chain.from_iterable(doubts.values()), set())
     _settle_drifts(clocks, pools)
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}

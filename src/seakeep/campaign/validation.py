@@ -68,8 +68,9 @@ def span_mistakes(settings: CampaignSettings, period: float) -> Iterable[Mistake
 def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     """Names of channels that the campaign has no channel of."""
     names = settings.channel_names
-    wanted: list[tuple[tuple[str, ...], str]]
-    wanted = [(("rig", "positions", name), name) for name in settings.rig.positions]
+    wanted: list[tuple[tuple[str, ...], str]] = [
+        (("rig", "positions", name), name) for name in settings.rig.positions
+    ]
     if settings.campaign.period_channel is not None:
         wanted.append((("campaign", "period_channel"), settings.campaign.period_channel))
     for table, model in settings.all_models().items():
@@ -111,14 +112,17 @@ def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
 
 
 def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
-    tables: dict[tuple[str, ...], Mapping[str, ChannelSettings | DerivedSettings]]
-    tables = {("channels",): settings.channels, ("derived",): settings.derived}
+    tables: dict[tuple[str, ...], Mapping[str, ChannelSettings | DerivedSettings]] = {
+        ("channels",): settings.channels,
+        ("derived",): settings.derived,
+    }
     tables |= {("runs", run, "channels"): each.channels for run, each in settings.runs.items()}
     for place, channels in tables.items():
-        units = {name: each.unit for name, each in channels.items() if each.unit is not None}
-        for name, unit in units.items():
+        for name, each in channels.items():
+            if each.unit is None:
+                continue
             try:
-                conversion(unit, units_of(name, unit), name)
+                conversion(each.unit, units_of(name, each.unit), name)
             except RequestError as error:
                 yield (*place, name, "unit"), str(error)
 

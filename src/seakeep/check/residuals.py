@@ -125,13 +125,12 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         past, limit = input_correlation([*zip(every, inputs, strict=True)], lags)
         variables["input_correlation"] = (("state", "input", "lag"), past.transpose(1, 2, 0))
         variables["input_limit"] = (("state", "input"), limit)
-    lag = model.dt * np.arange(lags + 1)
     return xr.Dataset(
         variables,
         coords={
             "state": model.states,
             "input": model.inputs,
-            "lag": ("lag", lag, {"units": "s", "long_name": "lag"}),
+            "lag": ("lag", model.dt * np.arange(lags + 1), {"units": "s", "long_name": "lag"}),
             "age": ("age", model.dt * np.arange(1, AGES * lags + 1), {"units": "s"}),
             "band": list(BANDS),
         },

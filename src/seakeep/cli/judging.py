@@ -390,19 +390,18 @@ def _band(
     models: Mapping[str, Model],
     level: float | None,
     band: str | None,
-    scheduler: str | None = None,
+    scheduler: str | None,
     members: bool = False,
 ) -> dict[str, Any]:
     """Level and kind of band that were asked for; a calibrated one knows its level."""
     from seakeep.models import is_ensemble
 
     ensembles = [each for each in models.values() if is_ensemble(each)]
-    given = {"--level": level, "--band": band, "--members": members}
+    given = {"--level": level, "--band": band}
     if not ensembles:
         alone = FOR_ENSEMBLES.format(", ".join(models))
-        refuse(given | {"--scheduler": scheduler}, alone)
+        refuse(given | {"--members": members, "--scheduler": scheduler}, alone)
     if members:
-        del given["--members"]
         refuse(given, NO_BAND)
     calibrations = [each.calibration for each in ensembles if each.calibration]
     if calibrations and not (band or members):
@@ -454,13 +453,13 @@ def check(
     read = read_campaign(campaign)
     check_output(out / "report.html", "report", read_files(read, model))
     check_report(out)
-    channels = identified.states, identified.inputs
+    states, inputs = identified.states, identified.inputs
     with progress_bar("Preparing") as progress:
-        used = [*channels[0], *channels[1]]
+        used = [*states, *inputs]
         runs = load_prepared(read, names=run or None, progress=progress, channels=used)
     try:
         prepared = None if run else runs
-        baselines = fit_baselines(read, *channels, prepared=prepared, beside=identified)
+        baselines = fit_baselines(read, states, inputs, prepared=prepared, beside=identified)
     except SeakeepError as error:
         say(f"Note: no baselines to compare with: {error}")
         baselines = {}
@@ -471,7 +470,7 @@ def check(
     for section in sections:
         for text in (*section.points, *section.notices):
             show(f"{section.title}: {text}")
-    size = f"{counted(len(channels[0]), 'state')}, {counted(len(channels[1]), 'input')}"
+    size = f"{counted(len(states), 'state')}, {counted(len(inputs), 'input')}"
     words = f"{model.name}, a model of kind {identified.kind} ({size}), on {read.name}."
     title = f"{model.stem}: what the model is worth"
     say(f"Wrote {write_page(out, title, {'description': words}, sections)}.")

@@ -115,7 +115,7 @@ def constant(record: Record) -> Findings:
     """Channels that never change."""
     for _, _, name, channel in record.recorded():
         if not np.ptp(channel.values):
-            unit = str(channel.attrs["units"])
+            unit = channel.attrs["units"]
             yield record.finding(SamplesKind.CONSTANT, name, float(channel[0]), unit=unit)
 
 
@@ -139,8 +139,7 @@ def levels(record: Record) -> Findings:
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
         limit = 0.5 * x.std()
         if abs(change) > limit and ratio > 5:
-            unit = str(channel.attrs["units"])
-            yield record.finding(SamplesKind.DRIFT, name, change, limit, unit)
+            yield record.finding(SamplesKind.DRIFT, name, change, limit, channel.attrs["units"])
 
 
 def impossible(record: Record) -> Findings:
@@ -180,8 +179,7 @@ def waves(record: Record) -> Findings:
         if not FLATTEST < height / length < STEEPEST:
             yield record.finding(SamplesKind.WAVES, name, height, unit="m", period=period)
         elif record.stated_period and not 1 / 3 < record.stated_period / period < 3:
-            stated = record.stated_period
-            yield record.finding(SamplesKind.STATED_PERIOD, name, period, stated, "s")
+            yield record.finding(SamplesKind.STATED_PERIOD, name, period, record.stated_period, "s")
 
 
 def units(record: Record) -> Findings:

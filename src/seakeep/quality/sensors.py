@@ -91,14 +91,13 @@ def redundant(record: Record) -> Findings:
     """Redundant sensors that disagree by more than a model may err, or hold still alone."""
     run = record.whole
     for (name, other), agreement in compared(run, record.redundant).items():
-        unit = str(run[name].attrs["units"])
-        for kind, value, limit, its_unit in _faults(agreement, unit):
+        for kind, value, limit, unit in _faults(agreement, run[name].attrs["units"]):
             yield record.finding(
                 kind,
                 name,
                 value,
                 limit,
-                its_unit,
+                unit,
                 other=other,
                 correlation=agreement.correlation,
                 spread=agreement.lag_spread,
@@ -237,8 +236,7 @@ class Agreement:
     @property
     def spanned(self) -> float:
         """Steps of the sensor that the motion spans from crest to trough (2√2 of its SD)."""
-        known = np.isfinite(self.step) and self.step > 0
-        return float(2 * np.sqrt(2) * self.motion / self.step) if known else np.inf
+        return float(2 * np.sqrt(2) * self.motion / self.step) if self.step > 0 else np.inf
 
 
 def compare_sensors(

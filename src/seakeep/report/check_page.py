@@ -354,8 +354,9 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
         instants=result.attrs["instants"],
         period=period,
     )
-    figure = drawing("residuals", checks.residuals, result)
-    return section("residuals", figure, shown, **result.attrs)
+    return section(
+        "residuals", drawing("residuals", checks.residuals, result), shown, **result.attrs
+    )
 
 
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -397,8 +398,12 @@ def validity_section(result: xr.Dataset, checked: Checked) -> Section:
         f"{text[0].upper()}{text[1:]} This test shows memory, not skill."
         for text in checked.repeats.values()
     ]
-    figure = drawing("validity", checks.validity, result)
-    return section("validity", figure, table("validity", rows), points=points)
+    return section(
+        "validity",
+        drawing("validity", checks.validity, result),
+        table("validity", rows),
+        points=points,
+    )
 
 
 def drift_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -411,8 +416,9 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
             for at in entries(own.assign(model=model), "point"):
                 offset = uncertain(at["offset"], at["offset_uncertainty"])
                 rows.append((*row(at, "shown", "run", point_frequency=3, model=4), offset))
-    figure = drawing("drift", checks.drift, result)
-    return section("drift", figure, table("drift", rows), **result.attrs)
+    return section(
+        "drift", drawing("drift", checks.drift, result), table("drift", rows), **result.attrs
+    )
 
 
 CHECK_SECTIONS = {
@@ -432,9 +438,9 @@ def check_sections(checked: Checked) -> list[Section]:
     """Sections of the page; each says what could not be judged, and why."""
     out = []
     for make, needed in CHECK_SECTIONS.items():
-        result = checked.results.get(needed[0])
-        title = WORDS["sections"][needed[0]]["title"]
-        built = Section(needed[0], title) if result is None else make(result, checked)
+        key = needed[0]
+        result, title = checked.results.get(key), WORDS["sections"][key]["title"]
+        built = Section(key, title) if result is None else make(result, checked)
         refused = [checked.refused[name] for name in needed if name in checked.refused]
         texts = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
         texts += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))

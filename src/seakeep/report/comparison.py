@@ -296,8 +296,7 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
     if (ahead := forecast.attrs.get("reads_input_until", 0.0)) > 0.0:
         columns[UNTIL] = (forecast["time"].values + ahead).round(9)
     if forecast.attrs.get("scale") == "full":
-        scale = forecast.attrs["scale_factor"]
-        columns["scale_factor"] = np.full(forecast.sizes["time"], scale)
+        columns["scale_factor"] = np.full(forecast.sizes["time"], forecast.attrs["scale_factor"])
     return columns
 
 

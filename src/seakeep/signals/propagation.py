@@ -351,8 +351,8 @@ def misplaced_probes(
     for a, b in sorted(against, key=lambda pair: separations[pair].spread):
         probe, other, own = b, a, separations[a, b]
         if a not in backed and b in backed:
-            back = replace(own, separation=-own.separation, stated=-own.stated)
-            probe, other, own = a, b, back
+            probe, other = a, b
+            own = replace(own, separation=-own.separation, stated=-own.stated)
         certain = probe not in backed and other in backed
         out.setdefault((probe,) if certain else (a, b), Misplaced(probe, other, own, certain))
     return list(out.values())

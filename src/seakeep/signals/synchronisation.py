@@ -267,15 +267,13 @@ def clock_from_shared(
         (a, c), (b, t), offset, rate = (b, t), (a, c), -offset / rate, 1 / rate
     # Noise between samples is less than at them, which would draw the instants there.
     edge = max(_highest_frequency(x, usual_step(times)) for x, times in ((a, c), (b, t)))
-    a, b = (_below(edge, x, usual_step(times)) for x, times in ((a, c), (b, t)))
+    (a, own_end), (b, end) = (_below(edge, x, usual_step(times)) for x, times in ((a, c), (b, t)))
     other = CubicSpline(t, b)
-    # The ends of the filters are left out.
-    ends = [2.0 / edge if 0 < edge < 0.2 / usual_step(times) else 0.0 for times in (c, t)]
-    whole = (c >= c[0] + ends[0]) & (c <= c[-1] - ends[0])
+    whole = (c >= c[0] + own_end) & (c <= c[-1] - own_end)
     centre = float(c.mean())
     for _ in range(6):
         instants = (c - offset) / rate
-        inside = whole & (instants >= t[0] + ends[1]) & (instants <= t[-1] - ends[1])
+        inside = whole & (instants >= t[0] + end) & (instants <= t[-1] - end)
         slope = other(instants[inside], 1)
         turn = -slope * (c[inside] - centre)
         (shift, stretch), errors, left, gain = _adjusted(
@@ -313,9 +311,14 @@ def _highest_frequency(series: FloatArray, dt: float) -> float:
     return float(np.argmax(grown >= SIGNAL * grown[-1]) / (series.size * dt))
 
 
-def _below(edge: float, series: FloatArray, dt: float) -> FloatArray:
-    """Series without what lies far above a frequency, as far as it was sampled there."""
-    return low_pass(series, dt, edge, 2 * edge) if 0 < edge < 0.2 / dt else series
+def _below(edge: float, series: FloatArray, dt: float) -> tuple[FloatArray, float]:
+    """Series without what lies far above a frequency, and how long the ends of the filter are, s.
+
+    A series that was hardly sampled there is as it was.
+    """
+    if not 0 < edge < 0.2 / dt:
+        return series, 0.0
+    return low_pass(series, dt, edge, 2 * edge), 2.0 / edge
 
 
 def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:

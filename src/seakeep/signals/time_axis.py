@@ -111,7 +111,7 @@ class Clock:
         return replace(self, offset=offset, drift=drift, method=f"{self.method}, {why}")
 
 
-def check_order(time: ArrayLike, name: str = "the run") -> FloatArray:
+def check_order(time: ArrayLike, name: str) -> FloatArray:
     """Return the times as floats; refuse values that are not finite, repeated or unsorted."""
     t = as_real(time, f"the times of {name}", DataError)
     if t.ndim != 1 or t.size < 2:

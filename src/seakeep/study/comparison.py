@@ -267,13 +267,14 @@ def compare_models(
             time = run["time"].values
             at, last = samples_in(run, used, whole_span(run, "test"), dt, history, lead, first)
             begin = float(time[at]) if first is None else first
-            window: Any = run, begin, count or max(last - at, 1)
+            instants = count or max(last - at, 1)
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
-                how: Any = {"level": level, "band": band, "executor": executor, "progress": tell}
-                forecast = model.forecast_summary(*window, **how)
+                forecast = model.forecast_summary(
+                    run, begin, instants, level=level, band=band, executor=executor, progress=tell
+                )
             else:
-                forecast = model.forecast(*window)
+                forecast = model.forecast(run, begin, instants)
             each = _judged(model, run, name, forecast)
             compared[label].append(each)
             _warn_of_known(model, each)
@@ -373,8 +374,9 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
         ``scale_factor`` over ``run``.
     """
     table = xr.concat([_row(comparison, intervals) for comparison in comparisons], dim="run")
-    for name in set(table) & set(UNITS):
-        table[name].attrs["units"] = UNITS[str(name)]
+    for name, unit in UNITS.items():
+        if name in table:
+            table[name].attrs["units"] = unit
     return table
 
 

@@ -27,7 +27,6 @@ POSITIVE = {
     "pitch": "bow up (the bow points against the waves)",
     "yaw": "right-handed about z",
 }
-WELCH = ("paper", "recommended")
 
 
 def describe_study(study: Study, plan: Plan) -> Groups:
@@ -200,7 +199,7 @@ def _spectra(plan: Plan) -> xr.Dataset | None:
         for name, run in plan.runs.items()
     }
     grid = [[curve(x, how) for how in (paper_welch(plan.dt), ())] for x in records.values()]
-    names = {"run": list(records), "kind": list(WELCH)}
+    names = {"run": list(records), "kind": ["paper", "recommended"]}
     out = side_by_side(grid, names).drop_vars("bin").assign_attrs(channel=waves)
     heights = [significant_height(x) for x in records.values()]
     return out.assign(significant_height=("run", heights, {"units": "m"}))

@@ -134,8 +134,7 @@ def fit_campaign(
     for name, run in in_waves(both | load_prepared(campaign, names=others)).items():
         begin, end = whole_span(run, "test")
         warn_of_waves(identified, run, name, begin, round((end - begin) / dt))
-    look_ahead = identified.signature.input_map.look_ahead
-    latest = max(look_ahead(run, dt) for run in runs.values()) - dt
+    latest = max(identified.signature.input_map.look_ahead(run, dt) for run in runs.values()) - dt
     if latest > 0.5 * dt:
         warn(
             f"forecasts of this model read the inputs up to {latest:.3g} s after the instant that "

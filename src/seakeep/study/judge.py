@@ -142,8 +142,9 @@ def side_by_side(
     grid: Sequence[Sequence[xr.Dataset]], names: Mapping[str, Any], fill: Any = np.nan
 ) -> xr.Dataset:
     """Datasets over two new dimensions, first that of the rows."""
-    how = {"join": "outer", "combine_attrs": "override", "fill_value": fill}
-    out = xr.combine_nested(grid, list(names), **how).assign_coords(names)
+    out = xr.combine_nested(
+        grid, list(names), join="outer", combine_attrs="override", fill_value=fill
+    ).assign_coords(names)
     return out.transpose(*names, ...)
 
 
@@ -199,9 +200,8 @@ def difference_table(
         "measure": test["measure"].values,
         "channel": _names(test),
     }
-    how = {"rng": rng, "blocks": blocks, "n_series": DIFFERENCES, "signed": True}
-    values = np.exp(with_bounds(ratio, cells, **how)) - 1.0
-    out = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
+    change = with_bounds(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES, signed=True)
+    out = numbered(np.exp(change) - 1.0, ("number", *coords), ("change", "lower", "upper"), coords)
     for key, words in {"change": "", "lower": ", lower bound", "upper": ", upper bound"}.items():
         out[key].attrs["long_name"] = f"median error of model over that of other, minus one{words}"
     return out
@@ -398,8 +398,15 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
             return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
-    how = {"rng": rng, "blocks": blocks, "n_series": DIFFERENCES, "signed": True}
-    values = with_bounds(change, level.values, growth.values, **how)
+    values = with_bounds(
+        change,
+        level.values,
+        growth.values,
+        rng=rng,
+        blocks=blocks,
+        n_series=DIFFERENCES,
+        signed=True,
+    )
     growths = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
     lines = numbered(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
     return xr.merge([growths, lines])

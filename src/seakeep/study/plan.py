@@ -89,8 +89,7 @@ def named(progress: Progress | None, words: str) -> Progress | None:
     """Put words before what a progress names."""
     if progress is None:
         return None
-    report = progress
-    return lambda done, total, name: report(done, total, f"{words}{name}")
+    return lambda done, total, name: progress(done, total, f"{words}{name}")
 
 
 def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
@@ -241,7 +240,7 @@ def choose_tests(
     needs: Needs,
     whole: bool,
     seed: int,
-    training: Sequence[TrainingSet] = (),
+    training: Sequence[TrainingSet],
 ) -> tuple[TestWindow, ...]:
     """Choose the windows of a test set.
 
@@ -252,7 +251,7 @@ def choose_tests(
     for each in names:
         run = runs[each]
         span = whole_span(run) if whole or "test_span" not in run.attrs else run.attrs["test_span"]
-        first, last = _samples(run, (float(span[0]) + test.startup, float(span[1])))
+        first, last = _samples(run, (span[0] + test.startup, span[1]))
         # The last step reads the input `lead` samples after the instant that it starts from.
         spans[each] = (max(first, needs.history), min(last, run.sizes["time"] - max(needs.lead, 1)))
     longest = max(last - first + 1 for first, last in spans.values())

@@ -313,5 +313,6 @@ def detrended_text(campaign: str) -> str:
 
 def study_text(act: Act, size: Size, seed: int) -> str:
     """Study file of an act."""
-    given = {"act": act, "size": size, "seed": seed, "mark": MARK, "kind": STUDY_FILE}
-    return rendered("study", "study.toml", **given)
+    return rendered(
+        "study", "study.toml", act=act, size=size, seed=seed, mark=MARK, kind=STUDY_FILE
+    )

@@ -131,7 +131,6 @@ def resolve_model(
         If there is no encounter period to count in, or a key is unknown, missing or out of range.
     """
     kind = _kind_of(settings)
-    ensemble = kind.is_ensemble
     if settings.preset not in (None, *presets_of(kind)):
         raise RequestError(
             f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
@@ -150,7 +149,7 @@ def resolve_model(
             f"{did_you_mean(unknown[0], known)} Keys: {', '.join(known)}."
         )
     if encounter_period is None and (preset is not None or counts_in_periods(settings)):
-        what = "an ensemble" if ensemble else "the model"
+        what = "an ensemble" if kind.is_ensemble else "the model"
         what = what if preset is None else f"preset = '{preset}'"
         raise RequestError(
             f"{what} counts in encounter periods, and the campaign has none. State "
@@ -161,9 +160,7 @@ def resolve_model(
     if "observables" in stated:
         observables = observables_of(map(_counted, stated["observables"]))
         stated["observables"] = tuple(counted_in(each, encounter_period) for each in observables)
-    from_study: dict[str, Any] = (
-        {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
-    )
+    from_study: dict[str, Any] = {"seed": seed} if kind.is_ensemble and seed is not None else {}
     filled: Any = None
     if preset is not None:
         filled = getattr(kind, preset)(encounter_period, dt)

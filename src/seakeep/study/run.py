@@ -431,8 +431,9 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
     if judged:
         learnt = learn_margin(judged, statistics.level, statistics.scale)
     margin, floor, law = learnt
-    keys = ("margin", "blocks", "warranted")
-    out: dict[str, Any] = {key: ("channel", getattr(margin, key)) for key in keys}
+    out: dict[str, Any] = {
+        key: ("channel", getattr(margin, key)) for key in ("margin", "blocks", "warranted")
+    }
     out["windows"] = sum(len(each.measured) for each in judged)
     if statistics.scale != "constant":
         out["floor"] = ("channel", floor)
@@ -445,12 +446,11 @@ def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Group
     """Put all units together, with the facts of their windows."""
     sets = [each.name for each in plan.training]
     numbers = list(dict.fromkeys(unit.training for unit in computed))
-    nothing = xr.Dataset()
 
     def stacked(group: str, models: Iterable[str], dim: str) -> xr.Dataset:
         """A group of several models, over (`dim`, training)."""
         names = {dim: list(models), "training": [sets[k] for k in numbers]}
-        grid = [[computed[Unit(m, k)].get(group, nothing) for k in numbers] for m in models]
+        grid = [[computed[Unit(m, k)].get(group, xr.Dataset()) for k in numbers] for m in models]
         return side_by_side(grid, names, FILL)
 
     out = {}

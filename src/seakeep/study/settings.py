@@ -307,8 +307,8 @@ def read_study(path: Path | str) -> Study:
     """
     path = expanded(path)
     settings = validated(StudySettings, read_toml(path, "study"), path, "study")
-    preset = settings.study.preset
-    campaign = read_campaign(expand(settings.study.campaign, path.parent), preset)
+    general = settings.study
+    campaign = read_campaign(expand(general.campaign, path.parent), general.preset)
     study = Study(path, settings, campaign)
     if mistakes := _cross_checks(study):
         raise refusal(path, "study", mistakes)

@@ -81,17 +81,30 @@ def response(
         factor, units, label = _shown(own)
         frequency, trained, phase = (own[k].values for k in ("frequency", "trained", "phase"))
         for place in (gain, turn):
-            across = {"transform": place.get_xaxis_transform(), "step": "mid", **SHADE}
-            words = "no energy in training"
-            place.fill_between(frequency, 0, 1, where=~trained, label=words, **across)
+            place.fill_between(
+                frequency,
+                0,
+                1,
+                where=~trained,
+                label="no energy in training",
+                transform=place.get_xaxis_transform(),
+                step="mid",
+                **SHADE,
+            )
             place.set(xlim=frequency[[0, -1]], xlabel="frequency [Hz]")
         gain.plot(frequency, factor * own["amplitude"], **LINES["forecast"], label="model")
         wraps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180)  # no line runs across
         turn.plot(*np.insert([frequency, phase], wraps, np.nan, axis=1), **LINES["forecast"])
         if "amplitude_lower" in own:
             bounds = (factor * own[f"amplitude_{each}"] for each in ("lower", "upper"))
-            band = {"color": COLOURS["forecast"], "alpha": 0.25, "linewidth": 0}
-            gain.fill_between(frequency, *bounds, **band, label="95 % of the members")
+            gain.fill_between(
+                frequency,
+                *bounds,
+                color=COLOURS["forecast"],
+                alpha=0.25,
+                linewidth=0,
+                label="95 % of the members",
+            )
         if measured is not None:
             at = measured.sel(state=own["state"])
             at = at.where(at["amplitude_uncertainty"] < at["amplitude"])  # the rest is noise
@@ -128,14 +141,23 @@ def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
 
     for own, place in by_state(result, axes, (3.0, 1.9)):
         frequency, power = own["frequency"].values, own["spectrum"].values
-        light = {"color": PALETTE["light"], "linewidth": 0, "label": "spectrum of the state"}
-        place.fill_between(frequency, power / max(power.max(), 1e-300), **light)
+        place.fill_between(
+            frequency,
+            power / max(power.max(), 1e-300),
+            color=PALETTE["light"],
+            linewidth=0,
+            label="spectrum of the state",
+        )
         for ordinary in own["ordinary"]:
             place.plot(frequency, ordinary, **LINES["input"], label="with one input")
         place.plot(frequency, own["multiple"], **LINES["measured"], label="with all inputs")
         if "multiple_observables" in own:
-            line = {**LINES["forecast"], "label": "with observables too"}
-            place.plot(frequency, own["multiple_observables"], **line)
+            place.plot(
+                frequency,
+                own["multiple_observables"],
+                **LINES["forecast"],
+                label="with observables too",
+            )
         place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
         place.set_ylabel(f"coherence, {short_label(own['state'].item())} [1]")
     return place.figure
@@ -170,8 +192,15 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     picture = place.imshow(shares, cmap="Greys", vmin=0, vmax=1, aspect="auto")
     for (row, column), value in np.ndenumerate(shares):
         if value >= 0.05:
-            style = {"ha": "center", "va": "center", "fontsize": 7}
-            place.text(column, row, f"{value:.2f}", color="w" if value > 0.5 else "k", **style)
+            place.text(
+                column,
+                row,
+                f"{value:.2f}",
+                color="w" if value > 0.5 else "k",
+                ha="center",
+                va="center",
+                fontsize=7,
+            )
     place.set_xticks(range(len(states)), list(map(short_label, states)))
     place.set_yticks(range(len(words)), words)
     place.grid(False)
@@ -233,14 +262,21 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
         for each, dash in zip(own.get("input_correlation", ()), dashes, strict=False):
             wide = float(own["input_limit"].sel(input=each["input"]))
             past.axhspan(-wide, wide, **SHADE)
-            line = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": dash}
-            past.plot(own["lag"], each, **line, label=plain_text(each["input"].item()))
+            past.plot(
+                own["lag"],
+                each,
+                color=COLOURS["measured"],
+                linewidth=1.0,
+                linestyle=dash,
+                label=plain_text(each["input"].item()),
+            )
         past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
         past.set_title("with past inputs")
         frequency, power = own["frequency"][1:], own["measured_spectrum"].values
         top = power.max() if power.max() > 0 else 1.0
-        grey = {"color": PALETTE["pale"], "linewidth": 0.8, "label": "measured"}
-        spectrum.semilogy(frequency, power[1:] / top, **grey)
+        spectrum.semilogy(
+            frequency, power[1:] / top, color=PALETTE["pale"], linewidth=0.8, label="measured"
+        )
         error = own["error_spectrum"].values[1:] / top
         spectrum.semilogy(frequency, error, **LINES["forecast"], label="error")
         spectrum.set(xlim=(0, end), xlabel="frequency [Hz]", ylabel="power over peak [1]")
@@ -281,8 +317,12 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
             rayleigh = {**LINES["input"], "linestyle": ":", "label": "Rayleigh"}
             place.semilogy(factor * level, np.exp(-0.5 * (level / scale) ** 2), **rayleigh)
         if np.isfinite(shape):
-            weibull = {**LINES["input"], "label": "Weibull of the measured"}
-            place.semilogy(factor * level, np.exp(-((level / width) ** shape)), **weibull)
+            place.semilogy(
+                factor * level,
+                np.exp(-((level / width) ** shape)),
+                **LINES["input"],
+                label="Weibull of the measured",
+            )
         for kind, mark in (("measured", "o"), ("forecast", "x")):
             at, style = own.sel(kind=kind), {"markersize": 3, "markerfacecolor": "none"}
             style |= {"color": LINES[kind]["color"], "label": kind}

@@ -305,10 +305,21 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     for axes, name in zip(places, names, strict=True):
         for number, (model, of_model) in enumerate(nowcasts.items()):
             at, style = of_model.sel(run=run, channel=name), SERIES[1 + number % (len(SERIES) - 1)]
-            line = {"color": style["color"], "linestyle": style["linestyle"] if number else "-"}
-            axes.plot(at["lead"], at["error"], **line, label=plain_text(f"{model}: error"))
-            claimed = {"color": style["color"], "linewidth": 0.7, "alpha": 0.7}
-            axes.plot(at["lead"], at["claimed"], **claimed, label=plain_text(f"{model}: claimed"))
+            axes.plot(
+                at["lead"],
+                at["error"],
+                color=style["color"],
+                linestyle=style["linestyle"] if number else "-",
+                label=plain_text(f"{model}: error"),
+            )
+            axes.plot(
+                at["lead"],
+                at["claimed"],
+                color=style["color"],
+                linewidth=0.7,
+                alpha=0.7,
+                label=plain_text(f"{model}: claimed"),
+            )
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
         axes.set_title(short_label(name))
         axes.set(xlim=(0, first["lead"].max()), xlabel="lead time [s]")
@@ -346,11 +357,19 @@ def tuning_figure(table: xr.Dataset) -> Figure:
         part = table.isel(trial=np.array(names) == name)
         line = {**SERIES[number % len(SERIES)], "linestyle": "-"}
         axes.semilogx(part["ridge"], part["score"], **line, markersize=4, label=name)
-        band = {"color": line["color"], "alpha": 0.12}
-        axes.fill_between(part["ridge"], part["lower"], part["upper"], **band)
+        axes.fill_between(
+            part["ridge"], part["lower"], part["upper"], color=line["color"], alpha=0.12
+        )
     best = table.isel(trial=table["chosen"].values)
-    ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
-    axes.semilogx(best["ridge"], best["score"], "o", **ring, label="chosen")
+    axes.semilogx(
+        best["ridge"],
+        best["score"],
+        "o",
+        markersize=11,
+        fillstyle="none",
+        color="k",
+        label="chosen",
+    )
     axes.set_xlabel("ridge per snapshot pair (1)")
     axes.set_ylim(bottom=0.0)
     axes.legend(fontsize="small")

@@ -106,8 +106,7 @@ def draw_history(axes: Any, time: Any, measured: Values, curves: Sequence[Curve]
 
 def _draw_envelopes(envelope: Any, measured: Values, curves: Sequence[Curve]) -> None:
     """Draw the measurement, bands and forecasts, each by what draws its envelope."""
-    pale = {"color": PALETTE["pale"], "linewidth": 0}
-    envelope(measured, fill=True, label="measured, envelope", **pale)
+    envelope(measured, fill=True, label="measured, envelope", color=PALETTE["pale"], linewidth=0)
     band = {"alpha": 0.6 if len(curves) == 1 else 0.4, "linewidth": 0.6}
     for each in curves:
         if each.band:
@@ -172,8 +171,16 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
         row[0].set_ylabel(label, fontsize=LABEL)
         handles, labels = row[-1].get_legend_handles_labels()
         columns = max(1, min(4, len(labels), ACROSS // (6 + max(map(len, labels)))))
-        above = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.98), "borderaxespad": 0.0}
-        row[0].legend(handles, labels, **above, ncols=columns, fontsize=LABEL, handlelength=3.5)
+        row[0].legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 0.98),
+            borderaxespad=0.0,
+            ncols=columns,
+            fontsize=LABEL,
+            handlelength=3.5,
+        )
     figure.align_ylabels(axes[:, 0])
     for each in axes[-1]:
         each.set_xlabel("time [s]")
@@ -441,8 +448,9 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             for word, bit in FLAGS.items():
                 if (hit := (flags & bit) > 0).any():
                     at.plot(time[hit], filled[hit], label=word, zorder=3, **FLAGGED[word])
-            place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
-            at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
+            at.legend(
+                loc="lower right", bbox_to_anchor=(1.0, 0.95), fontsize=7, ncols=6, borderpad=0.1
+            )
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * np.abs(known).max():
             value = known[0]  # an axis that shows no rounding
@@ -519,8 +527,13 @@ def draw_spectra(
             mean = np.mean([np.interp(f, *each) for each in curves], axis=0)
             axes.plot(f, mean, label=label, color=colour, linestyle=dash)
     for number, frequency in enumerate(np.unique(regular.round(3))):
-        style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
-        axes.axvline(frequency, **style, label=None if number else "regular waves")
+        axes.axvline(
+            frequency,
+            color=COLOURS["start"],
+            linewidth=0.9,
+            linestyle="--",
+            label=None if number else "regular waves",
+        )
     axes.set_ylim(bottom=0)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)

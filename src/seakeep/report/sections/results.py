@@ -411,8 +411,7 @@ def _scales_table(result: StudyResult, test: str) -> Table:
     for at in entries(_rows(result, "boxes", test=test), "model"):
         both = (numbers(at["median"].sel(measure=key)) for key in ("nrmse", "training_nrmse"))
         columns.append([model_words(at["model"].item()), *map("{} ({})".format, *both)])
-    more = conditional(result, result.models)
-    return by_channel(result, "scales", [sizes, *columns], more, test)
+    return by_channel(result, "scales", [sizes, *columns], conditional(result, result.models), test)
 
 
 def regular(result: StudyResult) -> Section:
