@@ -19,16 +19,17 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import scipy
 import xarray as xr
 
 import seakeep
-from seakeep.signals import effective_celerity, encounter_period, peak_period, phase_celerity
+from seakeep.signals import effective_celerity, encounter_period, peak_period
 from seakeep.tank.delivery import write_record
 from seakeep.tank.instruments import record_run
 from seakeep.tank.play import check_settings, generator, play, play_run
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import TankSettings, default_settings
-from seakeep.waves import phase_speed
+from seakeep.waves import phase_speed, wavenumber
 
 MOTIONS = [f"{m}{k}" for m in ("surge", "heave", "pitch") for k in ("", "_rate", "_acceleration")]
 PROBES = ("eta_fwd", "eta_cog")
@@ -145,7 +146,11 @@ def celerities(delivered: Delivered, name: str, run: xr.Dataset) -> dict[str, tu
     places = [part[probe].attrs["x_position"] for probe in PROBES]
     dt, depth, apart = run.attrs["dt"], run.attrs["water_depth"], places[1] - places[0]
     peak = 1.0 / peak_period(upstream, dt)
-    phase = phase_celerity(upstream, downstream, dt, apart, depth).at(peak)
+    how = {"fs": 1 / dt, "window": "hamming", "nperseg": min(round(60 / dt), upstream.size // 2)}
+    frequency, cross = (each[1:] for each in scipy.signal.csd(upstream, downstream, **how))
+    expected = wavenumber(2 * np.pi * frequency, depth) * apart  # the nearest turn to it is taken
+    turn = expected + np.angle(np.conj(cross) * np.exp(-1j * expected))
+    phase = float(np.interp(peak, frequency, 2 * np.pi * frequency * apart / turn))
     found = effective_celerity(upstream, downstream, dt, apart, depth)
     sea = play_run(delivered.settings, name, check_settings(delivered.settings, [name])).sea
     lags = np.linspace(*found.bounds, 4001)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from seas import sea
 
-from seakeep.signals import correlation_peak, effective_celerity, phase_celerity
+from seakeep.signals import correlation_peak, effective_celerity
 from seakeep.waves import phase_speed
 
 DEPTH, APART, DT = 3.6, 3.67, 1.64 / 32
@@ -42,19 +42,6 @@ def test_the_bound_keeps_the_peak_of_the_next_period_out():
     # The paper's unbounded peak sits a period late, below every phase speed of the band.
     assert wide - bounded.lag > 1.0
     assert APART / wide < phase_speed(tau * 1.13, DEPTH)
-
-
-@pytest.mark.parametrize("frequency", [0.4, 0.5, 0.7])
-def test_phase_celerity_is_that_of_linear_dispersion(frequency):
-    records, _ = probes(1, noise=0.015)
-    found = phase_celerity(*records, DT, APART, DEPTH)
-    expected = float(phase_speed(tau * frequency, DEPTH))
-    assert found.at(frequency) == pytest.approx(expected, rel=0.03)
-    assert np.interp(frequency, found.frequency, found.coherence) > 0.9
-    within = np.interp(frequency, found.frequency, found.spread)
-    assert 0.0 < within < 0.03 * expected
-    # Six half-overlapping segments: the coherence of no waves has a mean of about a fifth.
-    assert np.median(found.coherence[found.frequency > 3]) < 0.4
 
 
 @settings(max_examples=30)

@@ -27,7 +27,6 @@ from seakeep.signals.propagation import (
     carry_by_dispersion,
     effective_celerity,
     misplaced_probes,
-    phase_celerity,
     probe_separation,
 )
 from seakeep.signals.rigid_body import (
@@ -96,7 +95,6 @@ __all__ = [
     "misplaced_probes",
     "onto_uniform",
     "peak_period",
-    "phase_celerity",
     "pool_drift",
     "predict_waves",
     "probe_separation",

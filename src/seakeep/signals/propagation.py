@@ -27,7 +27,6 @@ from seakeep.arrays import (
     number,
     positive,
     time_step,
-    undefined,
 )
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
@@ -37,32 +36,6 @@ from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
 """Part of a step below which a lag is none: rounding leaves either sign of nought."""
-
-
-@dataclass(frozen=True, eq=False)
-class PhaseCelerity:
-    """Phase speed of the waves between two probes, frequency by frequency.
-
-    Parameters
-    ----------
-    frequency : ndarray, shape (frequency,)
-        Hz, above zero.
-    celerity : ndarray
-        Phase speed, m/s.
-    coherence : ndarray
-        Squared coherence of the two records, 0 to 1; the celerity means little where it is low.
-    spread : ndarray
-        Standard error of the celerity, m/s, from the coherence and the number of segments.
-    """
-
-    frequency: FloatArray
-    celerity: FloatArray
-    coherence: FloatArray
-    spread: FloatArray
-
-    def at(self, frequency: float) -> float:
-        """Celerity at a frequency (Hz), m/s, between its neighbours."""
-        return float(np.interp(frequency, self.frequency, self.celerity))
 
 
 @dataclass(frozen=True)
@@ -85,59 +58,6 @@ class EffectiveCelerity:
     lag: float
     correlation: float
     bounds: tuple[float, float]
-
-
-def phase_celerity(
-    upstream: ArrayLike, downstream: ArrayLike, dt: float, separation: float, depth: float
-) -> PhaseCelerity:
-    r"""Phase speed between two probes from the phase of their cross-spectrum.
-
-    The phase is known up to whole turns; the turn nearest to linear dispersion is taken, so that
-    probes may stand several wavelengths apart.
-
-    Parameters
-    ----------
-    upstream, downstream : array_like, shape (time,)
-        Elevations at the two probes, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    separation : float
-        Distance between the probes, m.
-    depth : float
-        Water depth, m; ``numpy.inf`` for deep water.
-
-    Returns
-    -------
-    PhaseCelerity
-        Frequencies, celerities :math:`2\pi f d/\varphi(f)`, coherence and spread.
-
-    Raises
-    ------
-    RequestError
-        If the records differ in length or a number is out of range.
-    DataError
-        If a record is constant.
-
-    Notes
-    -----
-    Spread of the phase: :math:`\sqrt{(1-\gamma^2)/(2 n \gamma^2)}` for n independent segments
-    (Bendat and Piersol, Random Data).
-    """
-    first, second = as_pair(upstream, downstream, minimum=8, moving=True)
-    step, apart = time_step(dt), positive(separation, "the separation", "m")
-    length = min(round(60.0 / step), first.size // 2)
-    options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length}
-    # Without zero frequency, which has no phase.
-    frequency, cross = (each[1:] for each in scipy.signal.csd(first, second, **options))
-    coherence = np.minimum(scipy.signal.coherence(first, second, **options)[1][1:], 1.0)
-    expected = wavenumber(2 * np.pi * frequency, depth) * apart
-    # The nearest phase to linear theory's; np.angle gives that of the transform, −ωτ.
-    phase = expected + np.angle(np.conj(cross) * np.exp(-1j * expected))
-    phase = np.maximum(phase, 1e-9)
-    celerity = 2 * np.pi * frequency * apart / phase
-    with undefined():
-        error = np.sqrt((1.0 - coherence) * length / (2.0 * first.size * coherence))
-    return PhaseCelerity(frequency, celerity, coherence, celerity * error / phase)
 
 
 def effective_celerity(
