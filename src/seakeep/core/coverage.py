@@ -285,9 +285,6 @@ def _parts(shape: tuple[int, ...], heights: FloatArray | None) -> dict[str, Bool
     return out
 
 
-QUARTILES = 0.25, 0.5, 0.75
-
-
 @dataclass(frozen=True)
 class BoxStatistics:
     """The numbers that a box plot draws.
@@ -348,7 +345,9 @@ def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
     if x.size == 0:
         raise DataError(f"all {everything.size} value(s) are NaN; there is no box to draw.")
     with undefined():  # beside an infinite value
-        between, higher = (np.quantile(x, QUARTILES, method=m) for m in ("linear", "higher"))
+        between, higher = (
+            np.quantile(x, [0.25, 0.5, 0.75], method=m) for m in ("linear", "higher")
+        )
     first, middle, third = np.where(np.isnan(between), higher, between).tolist()
     room = 1.5 * (third - first)
     # A whisker never ends inside the box, also where no value lies between it and the fence.

@@ -187,7 +187,7 @@ class InputMap:
             lines.append(
                 f"  centre        departures from means of {self.reference} samples up to a start"
             )
-        return lines + self.columns.describe(dt, self.lead)
+        return lines + self.columns.describe(self.lead)
 
 
 @dataclass(frozen=True, eq=False)

@@ -459,16 +459,16 @@ class Observed:
             columns -= (1.0 - self.slopes) * np.maximum(columns - self.tops, 0.0)
         return columns
 
-    def describe(self, dt: float, lead: int) -> list[str]:
+    def describe(self, lead: int) -> list[str]:
         """One line per observable; `lead` is the look-ahead of the inputs."""
         lines = []
         for each, bound in zip(self.observables, self.bound, strict=True):
-            ahead = each.reach(dt)[1] + (lead if each.delayed else 0)
+            ahead = each.reach(self.dt)[1] + (lead if each.delayed else 0)
             columns = f"{len(bound.labels)} column{'' if len(bound.labels) == 1 else 's'}"
             delays = "with the input delays" if each.delayed else "at lags of their own"
             lines.append(
                 f"  observable    {named(each)}: {columns} {delays}, reads up to "
-                f"{max(ahead - 1, 0) * dt:.3g} s after the instant forecast"
+                f"{max(ahead - 1, 0) * self.dt:.3g} s after the instant forecast"
             )
         return lines
 

@@ -352,9 +352,8 @@ class HankelSettings:
 
     def _check_readouts(self) -> None:
         """Refuse read-outs that these settings leave no room for."""
-        followed = None
-        if self.alignment is not None and self.alignment.surge == "predicted":
-            followed = self.alignment.surge_channel
+        aligned = self.alignment
+        followed = aligned.surge_channel if aligned and aligned.surge == "predicted" else None
         kinds = {"every load": "auto"} if isinstance(self.readouts, str) else dict(self.readouts)
         if followed in kinds:
             raise RequestError(

@@ -139,11 +139,10 @@ class Conditions:
         texts: list[list[str]] = [[], [], [], []]
         for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
             peak, periods = self.peak[at], self.trained.periods
-            known = self.trained.known[at]
             trained = np.flatnonzero(self.trained.shares[at] >= TRAINED)
             if self.reasons[0, at]:
                 low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
-                if low < peak < high and not known[peak]:
+                if low < peak < high and not self.trained.known[at, peak]:
                     low, high = trained[trained < peak][-1], trained[trained > peak][0]
                     where, word, nothing = "between", "and", ", with none between"
                 texts[0].append(

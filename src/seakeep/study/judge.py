@@ -177,11 +177,10 @@ def difference_table(
     """Change of the median error from one model to another, with its interval.
 
     ``change`` over (model, other, measure, channel) is the median error over all cells over that of
-    the other model, minus one: −0.2 is better by 20 %; models that both diverge in more than half
-    of the cells are alike. ``lower`` and ``upper`` come from a two-way
-    block bootstrap over training sets and test windows
-    (:func:`seakeep.statistics.two_way_interval`); ``blocks`` of each that overlap are drawn
-    together. Where the interval holds zero the study cannot tell.
+    the other model, minus one: −0.2 is better by 20 %; NaN of models that both diverge in more than
+    half of the cells. ``lower`` and ``upper`` come from a two-way block bootstrap over training
+    sets and test windows (:func:`seakeep.statistics.two_way_interval`); ``blocks`` of each that
+    overlap are drawn together. Where the interval holds zero the study cannot tell.
     """
     order, _ = training_order(training)
     blocks = blocks_of([test], training)
@@ -190,9 +189,8 @@ def difference_table(
 
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
-        own, other = middle[:, :, None], middle[:, None]
         with undefined():
-            return np.log(np.where(np.isinf(own) & np.isinf(other), 1.0, own / other))
+            return np.log(middle[:, :, None] / middle[:, None])
 
     coords = {
         "model": test["model"].values,
