@@ -421,7 +421,6 @@ def _regular(
         "time_missing": report.missing,
         "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
     }
-
     names = [str(name) for name in data]
     variables = {n: ("time", x, data[n].attrs) for n, x in zip(names, values.T, strict=True)}
     uniform = xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)

@@ -138,9 +138,9 @@ class Conditions:
         """A sentence for each reason: periods, heights, steepnesses, means, mean surge."""
         texts: list[list[str]] = [[], [], [], []]
         for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
-            peak, periods = self.peak[at], self.trained.periods
-            trained = np.flatnonzero(self.trained.shares[at] >= TRAINED)
             if self.reasons[0, at]:
+                peak, periods = self.peak[at], self.trained.periods
+                trained = np.flatnonzero(self.trained.shares[at] >= TRAINED)
                 low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
                 if low < peak < high and not self.trained.known[at, peak]:
                     low, high = trained[trained < peak][-1], trained[trained > peak][0]
