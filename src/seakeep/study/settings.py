@@ -32,7 +32,7 @@ from seakeep.toml import (
     validated,
 )
 
-FORMAT = 10
+FORMAT = 11
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
