@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from free_runs import loop_score
 from records import record
+from scipy.signal import lfilter
 from squared import INPUTS, PERIOD, STATES, runs
 
 from seakeep import HankelDMDc, tune
@@ -68,6 +69,25 @@ def test_a_kind_that_is_better_beyond_the_noise_is_taken_by_tune():
     taps = model.B[0] * model.state_std / model.input_std
     # Of 4 runs of 200 samples in noise of SD 1: to 0.035 each.
     np.testing.assert_allclose(taps, [1.0, -0.5, 0.3, 0.0], rtol=0, atol=0.12)
+
+
+def test_recommended_names_a_subspace_model_where_noise_spoils_delayed_states():
+    """A weakly damped motion with a third of noise: states regressed on it decay too fast."""
+    given = {}
+    for seed in range(4):
+        eta, noise = np.random.default_rng(seed).standard_normal((2, 600))
+        motion = lfilter([0.0, 1.0], [1.0, -2 * 0.98 * np.cos(2 * np.pi / 16), 0.98**2], eta)
+        heave = motion + 0.3 * motion.std() * noise
+        given[f"run {seed}"] = record(0.1, {"encounter_period": 1.6}, heave=heave, eta=eta)
+    spec = HankelDMDc(6, 6, "rollout", delay_rows="exact", ridge_scale="per_snapshot")
+    chosen = spec.settled(given, ["heave"], ["eta"])
+    assert "kind = 'subspace' errs 0." in chosen.note
+    assert isinstance(chosen.settings, HankelDMDc)
+    assert chosen.rival is None  # no host runs it
+    # Runs that are shorter than its past and future stop nothing.
+    short = {name: run.isel(time=slice(75)) for name, run in given.items()}
+    few = replace(spec, state_delays=40, select={"horizon": 1.0})
+    assert "subspace" not in few.settled(short, ["heave"], ["eta"]).note
 
 
 @pytest.mark.parametrize("spec", [FIR(24, 1e-3, lead=3), Subspace(8, 24, 0.1), ARX(8, 16, 1e-2)])

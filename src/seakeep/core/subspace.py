@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.core.embedding import TrainingWindow, embed
+from seakeep.core.embedding import TrainingWindow
+from seakeep.core.gram import Delayed, lagged_response, primal_system, ridge_path
 from seakeep.core.response import clip_modes
 from seakeep.core.rollout import rollout
 from seakeep.core.solve import solve
@@ -114,33 +115,30 @@ def identify_subspace(
     DataError
         If the past decides fewer than `order` directions of the future.
     """
-    pasts, driving, following, ahead = [], [], [], []
-    for y, u, d, window in zip(outputs, inputs, direct, windows, strict=True):
-        first, columns = window.first_column, window.columns
-        if columns < future:
+    s, z, f = output_delays, input_delays, future
+    for window in windows:
+        if window.columns < f:
             raise DataError(
-                f"a run of {columns} snapshot pairs is shorter than the future of {future} "
+                f"a run of {window.columns} snapshot pairs is shorter than the future of {f} "
                 "samples. Lower future, or give a longer run."
             )
-        past = [embed(y, output_delays, first, columns)]
-        if input_delays:
-            past.append(embed(u, input_delays - 1, first - 1, columns))
-        pasts.append(np.concatenate(past))
-        drives = np.concatenate([u, d], axis=1)
-        driving.append(drives[first : first + columns].T)
-        following.append(y[first + 1 : first + 1 + columns].T)
-        count = columns - future + 1
-        seen = embed(drives, future - 1, first + future - 1, count)
-        ahead.append(np.concatenate([seen, embed(y, future - 1, first + future, count)]))
-    split = (inputs[0].shape[1] + direct[0].shape[1]) * future
-    seen, targets = np.split(np.concatenate(ahead, axis=1), [split])
-    known = np.concatenate(
-        [past[:, : each.shape[1]] for past, each in zip(pasts, ahead, strict=True)], axis=1
+    # Past and future are one delayed series, as seen from the last instant of the future.
+    y = [np.pad(each, ((0, 1), (0, 0))) for each in outputs]
+    u, d = ([np.pad(each, ((1, 0), (0, 0))) for each in series] for series in (inputs, direct))
+    ends = [TrainingWindow(w.first, w.last + 1, w.first_column + f) for w in windows]
+    series = Delayed.of(y, [(y, f + s), (u, f + z - 1), (d, f - 1)], ends)
+    upper = primal_system(series).gram
+    gram = np.triu(upper) + np.triu(upper, 1).T
+    N, Q = y[0].shape[1], u[0].shape[1]
+    stops = np.cumsum([N * f, N * (s + 1), Q * f, Q * z])
+    targets, ys, us, earlier, ds = np.split(np.arange(len(gram)), stops)
+    past = np.concatenate([ys, earlier])
+    both = np.concatenate([past, us, ds])
+    (coefficients,) = ridge_path(
+        gram[np.ix_(both, both)], gram[np.ix_(targets, both)], [ridge * series.columns]
     )
-    regressors = np.concatenate([known, seen])
-    coefficients = solve(regressors, targets, ridge * regressors.shape[1]).coefficients
-    decided = coefficients[:, : len(known)]
-    values, vectors = np.linalg.eigh(decided @ (known @ known.T) @ decided.T)
+    decided = coefficients[:, : past.size]
+    values, vectors = np.linalg.eigh(decided @ gram[np.ix_(past, past)] @ decided.T)
     leading = np.sqrt(np.maximum(values[::-1][:order], 0.0))
     if len(leading) < order or leading[-1] <= 1e-7 * leading[0]:  # rounding of a Gram matrix
         raise DataError(
@@ -148,9 +146,20 @@ def identify_subspace(
             "future, or train on more data."
         )
     estimator = (vectors[:, ::-1][:, :order] / np.sqrt(leading)).T @ decided
-    states = [estimator @ past for past in pasts]
-    now = [np.concatenate([x, u])[:, :-1] for x, u in zip(states, driving, strict=True)]
-    then = [np.concatenate([x[:, 1:], y[:, :-1]]) for x, y in zip(states, following, strict=True)]
+    of_outputs, of_inputs = np.split(estimator, [ys.size], axis=1)
+    now, then = [], []
+    for x, u_run, d_run, w in zip(outputs, inputs, direct, windows, strict=True):
+        states = _filtered(x, of_outputs, w.first_column, w.columns)
+        if earlier.size:
+            states += _filtered(u_run, of_inputs, w.first_column - 1, w.columns)
+        drive = np.concatenate([u_run, d_run], axis=1)[w.first_column : w.last - 1].T
+        now.append(np.concatenate([states[:, :-1], drive]))
+        then.append(np.concatenate([states[:, 1:], x[w.first_column + 1 : w.last].T]))
     both = solve(np.concatenate(now, axis=1), np.concatenate(then, axis=1), 0.0).coefficients
     (A, B), (C, D) = (np.split(rows, [order], axis=1) for rows in np.split(both, [order]))
     return StateSpace(clip_modes(A, 1.0)[0], B, C, D, estimator)
+
+
+def _filtered(series: FloatArray, filters: FloatArray, first: int, count: int) -> FloatArray:
+    """Delayed samples times each row of filters, shape (row, count)."""
+    return np.array([lagged_response(series, each, first, count) for each in filters])

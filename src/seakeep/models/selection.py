@@ -33,7 +33,7 @@ from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.core import metrics
 from seakeep.core.embedding import spread_means, training_window
 from seakeep.core.gram import PrimalSystem, ridge_path
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.executor import in_order
 from seakeep.models import labelled
 from seakeep.models.candidates import Candidates, Columns, Given, Step, alignments_of
@@ -154,12 +154,12 @@ class Trial:
 
     def is_as_good_as(self, other: Trial) -> bool:
         """Whether it errs no more than another, but for a standard error over the groups."""
-        worse = self._by_group() - other._by_group()
+        worse = self.by_group() - other.by_group()
         worse = worse[np.isfinite(worse)]
         doubt = worse.std(ddof=1) / len(worse) ** 0.5 if len(worse) > 1 else 0.0
         return bool(worse.mean() <= doubt)
 
-    def _by_group(self) -> FloatArray:
+    def by_group(self) -> FloatArray:
         """Scores at the best level in each group, NaN where nothing moves."""
         best = self.scores[np.nanargmin(self.means)]
         total = np.bincount(self.groups, self.weights)
@@ -581,6 +581,17 @@ class _Trials:
                 return candidate, ridge
         return taken, level
 
+    def is_near(self, rival: HankelSettings, taken: HankelSettings) -> bool:
+        """Whether a kind that is slow to fit comes near the taken one on the first fold."""
+        problem = self.problem(rival)
+        fold = problem.folds()[0]
+        try:
+            scores, weights = problem.judge([(rival, self.levels(rival))], fold)[0]
+        except (RequestError, DataError):  # the runs are too short for it
+            return False
+        others = self.made[taken].by_group()[problem.groups.index(problem.groups[fold])]
+        return bool(np.min(scores @ weights) <= NEAR * others)
+
     def worth(self, taken: HankelSettings) -> str:
         """What a candidate errs without each of its observables, in words."""
         parts = taken.observables
@@ -612,7 +623,7 @@ class Selected(Generic[Chosen]):
     readouts : tuple of FittedReadOut
         Read-outs of these settings, fitted.
     rival : HankelSettings, optional
-        Settings of another kind, which the note names: they err less by more than the noise.
+        Settings of another kind that runs wherever these do: they err less by more than the noise.
     """
 
     settings: Chosen
@@ -743,7 +754,9 @@ def select(
         Encounter period, s; by default that of the runs.
     kinds : sequence of HankelSettings, optional
         Other kinds of models, which take what they have of the settings that were chosen. One that
-        errs less, by more than the noise, is named; it is chosen where `vary` names "kind".
+        errs less, by more than the noise, is named; it is chosen where `vary` names "kind". Where
+        it does not, a kind without a path of λ is left after the first fold if it errs a fifth
+        more there.
     executor : Executor, optional
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
@@ -880,7 +893,7 @@ def _rivalled(
 
     The better one is the best that errs less by more than the noise and does not grow.
     """
-    # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
+    # Beside a fit only the waves themselves are tried.
     search, words = trials.search, ""
     is_varied = "kind" in search.vary
     both = trials if is_varied else replace(trials, made=dict(trials.made))
@@ -888,7 +901,10 @@ def _rivalled(
     own = {"ridge"} if is_varied else {"ridge", "observables"}
     plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
     before = {*made}
-    both.judge(each.having(**plain) for each in kinds if search.given[2])
+    rivals = [each.having(**plain) for each in kinds if search.given[2]]
+    if not is_varied:
+        rivals = [each for each in rivals if each.has_path or both.is_near(each, taken)]
+    both.judge(rivals)
     others = [each for each in made if each not in before]
     for other in sorted(others, key=lambda each: made[each].best):
         if made[taken].is_as_good_as(made[other]):
@@ -900,7 +916,7 @@ def _rivalled(
             words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
             if is_varied:
                 taken, level = other, own_level
-            else:
+            elif other.has_path:  # subspace models run on no host
                 trials.rival = other.having(ridge=own_level)
             break
     return taken, level, words

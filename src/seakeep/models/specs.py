@@ -15,7 +15,7 @@ from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, w
 from seakeep.errors import SHOWN, DataError, RequestError, quiet
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.baselines import FIR
+from seakeep.models.baselines import FIR, Subspace
 from seakeep.models.candidates import MEMORY, default_observables
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
@@ -143,7 +143,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
             named,
             list(states),
             list(inputs),
-            kinds=(FIR(0),),
+            kinds=(FIR(0), Subspace(0, 0, 0.1)),
             executor=executor,
             progress=progress,
         )
