@@ -1,6 +1,7 @@
 """Checks report faults as data: which kind, where, how large."""
 
 import json
+from dataclasses import replace
 from math import tau
 
 import numpy as np
@@ -14,7 +15,7 @@ from seakeep.quality import Finding, Record, as_json, findings_of, warn_of
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
 from seakeep.quality.samples import waves as waves_of
-from seakeep.quality.sensors import LATE, RUN_AWAY, compare_sensors, redundant
+from seakeep.quality.sensors import LATE, RUN_AWAY, compare_sensors, derivatives, redundant
 
 DT = 0.04
 T = DT * np.arange(3000)
@@ -72,6 +73,25 @@ def test_constant_and_unrelated():
 def test_another_scale(factor, told):
     """A wrong unit does not change a correlation; the limits are 2 and 1/2."""
     assert kinds(factor * waves()) == (["SCALE"] if told else ["DIFFERENCE"])
+
+
+@pytest.mark.parametrize(("order", "suffix"), [(1, "rate"), (2, "acceleration")])
+def test_a_derivative_of_another_sign_or_scale_than_its_motion(order, suffix):
+    x = sea(0, (0.4, 0.9), peak=PERIOD, components=20)
+    omega = tau * x.frequency
+    changed = replace(x, phase=x.phase + order * tau / 4, amplitude=omega**order * x.amplitude)
+
+    def gains(factor):
+        both = np.stack([x.at(T), factor * changed.at(T)])
+        both += (
+            0.3 * both.std(axis=1, keepdims=True) * np.random.default_rng(0).normal(size=both.shape)
+        )
+        run = record(DT, {}, **dict(zip(("roll", f"roll_{suffix}"), both, strict=True)))
+        return [each.value for each in derivatives(Record("r", run))]
+
+    assert gains(1.0) == gains(0.6) == gains(1.8) == []
+    for factor in (-1.0, -57.3, 57.3):
+        assert gains(factor) == [pytest.approx(factor, rel=0.1)]  # noise of 0.3 SD lowers it
 
 
 @pytest.mark.parametrize(("part", "told"), [(0.8, False), (1.25, True)])

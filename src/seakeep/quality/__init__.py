@@ -40,6 +40,7 @@ CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     samples.flagged,
     samples.levels,
     sensors.redundant,
+    sensors.derivatives,
     sensors.positions,
     clocks.clocks,
     clocks.others,

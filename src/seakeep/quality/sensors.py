@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, as_series
+from seakeep.conventions import MOTIONS
 from seakeep.quality.faults import STUCK, find_held, noise_share
 from seakeep.quality.findings import (
     Findings,
@@ -48,6 +50,10 @@ class SensorsKind(Kind):
         "against {other}: scale: its standard deviation is {value:.3g} times as large; the unit or "
         "the calibration of one of them is wrong",
         "Check unit and column in [channels.{channel}].",
+    )
+    DERIVATIVE = (
+        "is {value:+.3g} times the {order}derivative of {other}, and should be +1 times it",
+        "Check unit, sign and column of both in [channels].",
     )
     HELD = "holds still for {value:.3g} while {other} moves, from {place:.4g} s"
     POSITION = (
@@ -136,6 +142,30 @@ def _faults(agreement: Agreement, unit: str) -> Iterator[tuple[SensorsKind, floa
             yield SensorsKind.DIFFERENCE, agreement.nrmse, LARGEST_NRMSE, "1"
 
 
+def derivatives(record: Record) -> Findings:
+    """Rates and accelerations of another sign or scale than the motion they belong to."""
+    run, dt, count = record.whole, step_of(record.whole), record.whole.sizes["time"]
+    frequency = np.fft.rfftfreq(count, dt)
+    for motion, (order, (suffix, words)) in product(MOTIONS, enumerate(DERIVED, start=1)):
+        name = motion + suffix
+        if not {motion, name} <= {*run.data_vars}:
+            continue
+        x, derivative = filled(run[motion]), filled(run[name])
+        period = dominant_period(derivative, dt)
+        near = (frequency > 0.5 / period) & (frequency < 2.0 / period)
+        if not np.ptp(x) or not near.any():
+            continue
+        both = np.stack([x - x.mean(), derivative - derivative.mean()]) * np.hanning(count)
+        moved, measured = np.fft.rfft(both)[:, near]
+        expected = (2j * np.pi * frequency[near]) ** order * moved
+        gain = np.vdot(expected, measured).real / np.vdot(expected, expected).real
+        alike = gain * np.linalg.norm(expected) / np.linalg.norm(measured)
+        if abs(alike) >= LEAST_CORRELATION and not 1 / LARGEST_GAIN <= gain <= LARGEST_GAIN:
+            yield record.finding(
+                SensorsKind.DERIVATIVE, name, gain, LARGEST_GAIN, "1", other=motion, order=words
+            )
+
+
 def positions(record: Record) -> Findings:
     """Stated positions of wave probes against the phases of the waves that passed them.
 
@@ -164,6 +194,9 @@ def positions(record: Record) -> Findings:
             unsure="" if each.certain else ", or the other probe is misplaced",
         )
 
+
+DERIVED = ("_rate", ""), ("_acceleration", "second ")
+"""Suffixes of the derivatives of a motion, and their order in words."""
 
 LEAST_CORRELATION = 0.8
 """At a lower correlation no lag and no scale is given: 36 % of the variance would be the sensor's
