@@ -64,7 +64,8 @@ CHANGES = {
         ("or steady > NOISY * period", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
     "check/coherence.py": [
-        ("1 if names else len(references) + linear", "len(references) + linear", "check/test_coherence.py::test_observables_lower_the_bound"),
+        ("bounding += [] if names else others", "bounding += others", "check/test_coherence.py::test_observables_lower_the_bound"),
+        ("elif plain := linear_part(model):", "elif plain := None:", "check/test_coherence.py::test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel"),
     ],
     "check/motion.py": [
         ("linear / np.hypot(2 * np.pi, linear)", "linear / (2 * np.pi)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
@@ -76,6 +77,8 @@ CHANGES = {
     ],
     "check/parts.py": [
         ("max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
+        ("* stays", "* 1.0", "check/test_coherence.py::test_observables_lower_the_bound"),
+        ("if 2 * each <= run", "if 2 * each > run", "check/test_worth.py::test_a_baseline_that_reads_a_longer_history_counts"),
         ("replace(input_map, reference=0))", "input_map)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
         ("model.at(parameter=varies.centre)", "model.at(parameter=varies.low)", "models/test_parametric.py::test_a_check_takes_the_middle_of_the_training"),
     ],

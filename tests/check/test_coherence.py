@@ -1,5 +1,7 @@
 """Coherence, and the bound of a linear map, for systems that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from records import record
@@ -87,7 +89,11 @@ def test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel():
     found = check.coherence(blurred, test)
     assert found.linear_bound[0] < found.nrmse[0]
     assert found.linear_bound[0] < 0.6 * plain  # of the resonance, leakage leaves much
-    for each in (check.coherence(exact, test), check.coherence(blurred, test, None, {"a": exact})):
+    # Without its observable the model is a linear one.
+    cubed = replace(spec, observables=(Expression("cube", "eta**3"),))
+    further = check.coherence(cubed.fit(light_run(5, noise=0), ["heave"], ["eta"]), test)
+    beside = check.coherence(blurred, test, None, {"a": exact})
+    for each in (check.coherence(exact, test), beside, further):
         low, high = (float(each[f"linear_bound_{end}"][0]) for end in ("lower", "upper"))
         # The noise; the start of the free run, which has it too, adds some two per cent.
         assert low / 1.02 < 0.01 / heave.std() < high

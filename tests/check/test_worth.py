@@ -98,6 +98,11 @@ def test_a_baseline_that_is_lost_does_not_count_and_is_named(model, runs, baseli
     assert "not shown" not in " ".join(each for each in points if "heave" in each)
 
 
+def test_a_baseline_that_reads_a_longer_history_counts(model, runs):
+    longer = FIR(40).fit({"train": runs["train"]}, STATES, ["eta"])
+    assert "longer" in worth(model, runs, {"longer": longer})["model"]
+
+
 @pytest.mark.parametrize(
     ("low", "words"),
     [

@@ -15,6 +15,7 @@ from seakeep.check.parts import (
     free_runs,
     irregular,
     judged,
+    linear_part,
     ratio,
     read_off,
     regressors,
@@ -84,18 +85,27 @@ def coherence(
     .. math:: \min_L \sqrt{\frac{\operatorname{var} e}{\operatorname{var} x}
               \frac{\int (1 - \gamma_{ue}^2) S_{ee}}{\int S_{ee}}}
 
-    over L = 0, the baselines, and the model where it is linear: it lies above the error of none of
-    them. The interval is that of the part that is left. Slow motions count with all their power.
+    over L = 0, the baselines, and what the model makes of the inputs without observables and
+    read-outs: it lies above the error of none of them that is linear. The interval is that of the
+    part that is left. Slow motions count with all their power.
     """
     if not model.inputs:
         raise RequestError("the model has no input, with which a state could be coherent.")
     runs, of = judged(runs)
     waves = irregular(runs, "coherence")
-    own = free_runs(model, waves, free)
+    own = free_runs(model, waves, free, others=(baselines or {}).values())
     parts = {name: part for name, part in used_parts(model, waves).items() if name in own}
     names = [name for name in model.signature.regressors if name not in model.inputs]
     linear = not names and not read_off(model)
-    references = [*beside(baselines, waves, own, free).values(), own]
+    others = [*beside(baselines, waves, own, free).values()]
+    bounding: list[dict[str, FreeRun]] = []
+    if linear:
+        bounding = [own]
+    elif plain := linear_part(model):
+        bounding = [free_runs(plain, waves, like=own)]
+    # Baselines take the observables of the model: then they bound no linear map.
+    references = [*bounding, *others, own]
+    bounding += [] if names else others
     pieces = []
     for name, part in parts.items():
         columns = regressors(model, part)
@@ -133,8 +143,7 @@ def coherence(
         "still": ("state", still),
         "period": ("state", slow, {"units": "s"}),
     }
-    # Baselines take the observables of the model: then they bound no linear map.
-    bounds = {"linear_bound": ("multiple", spectra, 1 if names else len(references) + linear)}
+    bounds = {"linear_bound": ("multiple", spectra, len(bounding) + 1)}
     if names:
         bounds["observables_bound"] = ("multiple_observables", further, len(references) + 1)
     least = spectra.ordinary()[..., :size].max(axis=1).T

@@ -126,11 +126,12 @@ def free_runs(
     free: Known | None = None,
     label: str = "",
     like: Mapping[str, FreeRun] | None = None,
+    others: Iterable[Model] = (),
 ) -> dict[str, FreeRun]:
     """Free runs from the first possible instant of each test part to its end, or as others go.
 
     Those in `free`, by label of the model and name of the run, are taken from there; the others
-    are put there.
+    are put there. They start where `others` can be forecast too, if the run is long enough.
 
     Raises
     ------
@@ -141,7 +142,8 @@ def free_runs(
 
     def played(name: str) -> FreeRun:
         if name not in known:
-            known[name] = _free_run(model, runs[name], name, (like or {}).get(name))
+            history = [each.history_samples for each in others]
+            known[name] = _free_run(model, runs[name], name, (like or {}).get(name), history)
         return known[name]
 
     names = runs if like is None else like
@@ -219,8 +221,25 @@ def beside(
     return {label: of for label, of in others.items() if of.keys() == own.keys()}
 
 
-def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
+def linear_part(model: Model) -> HankelDMDcModel | None:
+    """A model without its observables and read-outs, of an ensemble a member; None without any."""
+    member = model.member(0) if is_ensemble(model) else model
+    if not is_linear(member) or member.variation:
+        return None
+    signature = member.signature
+    delayed, direct = signature.input_map.regressors(signature.input_labels)
+    waves = np.tile(np.arange(len(delayed)) < len(member.inputs), signature.input_delays + 1)
+    states = member.coefficients.shape[1] - waves.size - len(direct)
+    stays = np.concatenate([np.ones(states), waves, np.zeros(len(direct))])
+    return replace(
+        member, coefficients=member.coefficients * stays, signature=replace(signature, readouts=())
+    )
+
+
+def window_of(model: Model, run: xr.Dataset, further: Iterable[int] = ()) -> tuple[int, int]:
     """First sample of a run that a forecast of its test part may start from, and the last sample.
+
+    It leaves room for `further` histories that are at most half as long as the run.
 
     Raises
     ------
@@ -228,6 +247,7 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
         If the test part ends before.
     """
     history, lead = model.history_samples, model.signature.lead_samples
+    history = max(history, *(each for each in further if 2 * each <= run.sizes["time"]), 0)
     if run.sizes["time"] <= history:
         raise DataError(
             f"the run has {run.sizes['time']} samples and a forecast reads {history} before "
@@ -275,11 +295,13 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
     return max(begins)
 
 
-def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
+def _free_run(
+    model: Model, run: xr.Dataset, name: str, like: FreeRun | None, further: Iterable[int]
+) -> FreeRun:
     if like:
         time, _, measured = like
     else:
-        at, last = window_of(model, run)
+        at, last = window_of(model, run, further)
         time = run["time"].values[at + 1 : last + 1]
         measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
     start = float(time[0]) - model.dt

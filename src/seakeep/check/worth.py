@@ -74,7 +74,7 @@ def worth(
         If no run can be forecast.
     """
     runs, of = judged(runs)
-    own = free_runs(model, runs, free)
+    own = free_runs(model, runs, free, others=(baselines or {}).values())
     every = {"model": own, **beside(baselines, runs, own, free)}
     spread = model.signature.state_scale.spread
 
