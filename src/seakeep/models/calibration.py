@@ -255,9 +255,10 @@ def held_out(
         Runs in which there is such a window.
     """
     free = {
-        name: _free_samples(ensemble, name, run, steps) for name, (ensemble, run) in cases.items()
+        name: places
+        for name, (ensemble, run) in cases.items()
+        if (places := _free_samples(ensemble, name, run, steps))
     }
-    free = {name: places for name, places in free.items() if places}
     judged: dict[str, Judged] = {}
     done, total = 0, sum(cases[name][0].n_members for name in free)
     for name, places in free.items():
@@ -265,8 +266,7 @@ def held_out(
         signature = ensemble.signature
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
-        time = np.asarray(run["time"].values, dtype=float)
-        starts = tuple(float(time[at]) for at in places)
+        starts = tuple(run["time"].values[places].astype(float).tolist())
         windows = ensemble.read_windows(run, starts, steps, name=name)
         ((series, lost),) = member_series(ensemble, [windows], executor, tell)
         values = reduce_members(series, lost, level)
@@ -295,11 +295,10 @@ def envelope_of(signature: Signature, windows: Windows) -> FloatArray:
     those at the place of the start.
     """
     count = len(signature.inputs)
-    centre, spread = (
-        part[:count] for part in (signature.input_scale.centre, signature.input_scale.spread)
-    )
-    values = (windows.delayed[..., :count] - centre) / np.where(spread > 0, spread, 1.0)
-    return wave_envelope(values, windows.steps)
+    scale = signature.input_scale.part(slice(count))
+    spread = np.where(scale.spread > 0, scale.spread, 1.0)
+    deviations = (windows.delayed[..., :count] - scale.centre) / spread
+    return wave_envelope(deviations, windows.steps)
 
 
 def _counted(progress: Progress, before: int, total: int, name: str) -> Progress:

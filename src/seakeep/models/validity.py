@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy import fft
+from scipy import fft, ndimage
 
 from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, IntArray
 from seakeep.conventions import is_elevation
@@ -21,6 +21,7 @@ from seakeep.core.spectra import split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled
 from seakeep.models.inputs import Signature
+from seakeep.models.labelled import ChannelLabel
 from seakeep.waves import GRAVITY
 
 PER_OCTAVE = 6
@@ -78,8 +79,8 @@ class Conditions:
         Mean, m.
     reach : ndarray, shape (2,)
         Lowest and highest surge in training, m.
-    units : tuple of str
-        Units of the channels.
+    labels : tuple of ChannelLabel
+        Names and units of the channels.
     """
 
     trained: Coverage
@@ -91,7 +92,7 @@ class Conditions:
     means: FloatArray
     surge: float | None
     reach: FloatArray
-    units: tuple[str, ...]
+    labels: tuple[ChannelLabel, ...]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({'; '.join(self.sentences()) or self.validity.words})"
@@ -137,7 +138,8 @@ class Conditions:
     def sentences(self) -> list[str]:
         """A sentence for each reason: periods, heights, steepnesses, means, mean surge."""
         texts: list[list[str]] = [[], [], [], []]
-        for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
+        for at, label in enumerate(self.labels):
+            channel, unit = label.name, label.units
             if self.reasons[0, at]:
                 peak, periods = self.peak[at], self.trained.periods
                 trained = np.flatnonzero(self.trained.shares[at] >= TRAINED)
@@ -218,11 +220,7 @@ class Coverage:
     @cached_property
     def known(self) -> BoolArray:
         """Bands that were trained, and those beside: a taper leaks there. Shape (channel, band)."""
-        trained = self.shares >= TRAINED
-        known = trained.copy()
-        known[:, 1:] |= trained[:, :-1]
-        known[:, :-1] |= trained[:, 1:]
-        return known
+        return ndimage.binary_dilation(self.shares >= TRAINED, [[True, True, True]])
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -300,9 +298,9 @@ class Coverage:
         if surge is not None and is_place and np.isfinite(surge).any():
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
-        units = tuple(label.units for label in signature.input_labels)
+        labels = signature.input_labels
         return Conditions(
-            self, peak, unseen, heights, steepnesses, reasons, means, mean, reach, units
+            self, peak, unseen, heights, steepnesses, reasons, means, mean, reach, labels
         )
 
 
