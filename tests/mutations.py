@@ -166,9 +166,9 @@ CHANGES = {
     "core/kalman.py": [
         ("on[:, count:] += reach[:, : size - count]", "on[:, :-count] += reach[:, : size - count]", "core/test_kalman.py::test_errors_of_today_are_carried_as_the_model_carries_them"),
         ("+ np.diag(self.noise[rows])", "+ np.diag(self.noise[rows] ** 0.5)", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
-        ("= before[count:, count:]", "= before[:-count, :-count]", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
-        ("block = top @ self.a.T + self.process", "block = top @ self.a.T", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
-        ("factor = np.minimum(factor, 1.0)", "factor = np.maximum(factor, 1.0)", "core/test_kalman.py::test_a_limit_scales_a_state_with_its_correlations"),
+        ("[[before[count:, count:],", "[[before[:-count, :-count],", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
+        ("top @ self.a.T + self.process", "top @ self.a.T", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
+        ("np.minimum(factor, 1.0)", "np.maximum(factor, 1.0)", "core/test_kalman.py::test_a_limit_scales_a_state_with_its_correlations"),
         ("residual - np.diag(noise) - (a * every) @ a.T", "residual - np.diag(noise)", "core/test_kalman.py::test_residuals_less_measurement_noise_are_process_noise"),
     ],
     "core/metrics.py": [
@@ -553,8 +553,8 @@ CHANGES = {
         ("filled[first:][missing] = found.expected[missing]", "filled[first:][missing] = 0.0", "models/test_ahead.py::test_missing_waves_are_those_of_a_record_that_was_continued"),
         ("int(lacking[at - 1]) + 1 if at else 0", "0", "signals/test_prediction.py::test_what_is_missing_is_filled_from_the_record_after_the_last_gap"),
         ("away * missing[late:]", "away", "signals/test_prediction.py::test_what_is_missing_is_filled_from_the_record_after_the_last_gap"),
-        ("departures[:, :, here] = carried[size:, 1:].T", "departures[here, :, here] = 0.0", "signals/test_prediction.py::test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it"),
-        ("expected[:, column] = values.mean() + continued(", "expected[:, column] = continued(", "signals/test_prediction.py::test_columns_are_continued_alone_and_a_still_one_stays"),
+        ("rest, future[:, here] = left, carried[size:]", "rest, future[:, here, 0] = left, carried[size:, 0]", "signals/test_prediction.py::test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it"),
+        ("+= values.mean() + continued(", "+= continued(", "signals/test_prediction.py::test_columns_are_continued_alone_and_a_still_one_stays"),
         ("scipy.signal.lfilter([1.0], whitening, first)", "scipy.signal.lfilter(whitening, [1.0], first)", "signals/test_prediction.py::test_the_power_of_innovations_is_that_of_a_known_process"),
     ],
     "signals/propagation.py": [
