@@ -326,29 +326,21 @@ def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) ->
 
 
 def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
-    """Which run of the training this is: the one that holds its samples, else that of its name.
+    """Which run of the training this is: one with the same samples, else that of its name.
 
     A name that was made up for a run without one says nothing.
     """
-    arrays, spans = ensemble.arrays, ensemble.read_spans
-    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
-        if key in spans and _holds(run, ensemble, name, begin, states):
-            return key
-    return name if name in spans and not labelled.is_made_up(name, run) else None
-
-
-def _holds(
-    run: xr.Dataset, ensemble: Ensemble, name: str, begin: float, states: FloatArray
-) -> bool:
-    """Whether a run has the same states at the same instants, as far as both reach."""
+    arrays, spans, signature = ensemble.arrays, ensemble.read_spans, ensemble.signature
     time = np.asarray(run["time"].values, dtype=float)
-    if not time.size:
-        return False
-    ahead = round((begin - time[0]) / ensemble.signature.dt)  # samples before the states
-    values = labelled.channel_matrix(run, ensemble.signature.states, name)
-    here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
-    count = min(len(here), len(there))
-    return count > 0 and np.array_equal(here[:count], there[:count])
+    values = labelled.channel_matrix(run, signature.states, name)
+    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
+        if key in spans and time.size:
+            ahead = round((begin - time[0]) / signature.dt)  # samples before the states
+            here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
+            count = min(len(here), len(there))  # as far as both reach
+            if count > 0 and np.array_equal(here[:count], there[:count]):
+                return key
+    return name if name in spans and not labelled.is_made_up(name, run) else None
 
 
 def calibrated_for(calibration: Calibration | None, level: float) -> Calibration:

@@ -922,9 +922,9 @@ class Live:
             update = _Update(np.empty((size, count)), np.empty(count))
             self._updates.append(None if as_it_is else update)
         parts = self._parts()
-        ends = np.cumsum([part.size for part in parts])
-        for part, own in zip(parts, np.split(values, ends[:-1]), strict=True):
-            part[:] = own.reshape(part.shape)
+        begins = np.cumsum([part.size for part in parts[:-1]])
+        for part, own in zip(parts, np.split(values, begins), strict=True):
+            part.flat[:] = own
 
 
 def load_live(model: Servable, path: str | Path) -> Live:

@@ -274,7 +274,7 @@ class Coverage:
         own = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
         lasts, peak = len(inputs) * dt if duration is None else duration, own.argmax(axis=1)
         repeats = lasts / self.periods[peak]
-        heights, steepnesses = _heights(inputs, dt)
+        means, (heights, steepnesses) = inputs.mean(axis=0), _heights(inputs, dt)
         margin = 1.1 + 1.7 / repeats**0.5
         unseen = np.where(self.known, 0.0, own).sum(axis=1)
         reasons = np.array(
@@ -282,16 +282,14 @@ class Coverage:
                 unseen > 0.5,
                 heights > margin * self.heights,
                 steepnesses > margin * self.steepnesses,
+                (means < self.lows) | (means > self.highs),
             ]
         )
-        reasons &= self.known.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
+        reasons[:3] &= self.known.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         if waves is not None:
-            reasons &= np.isin(np.arange(len(self.channels)), waves)
-        means = inputs.mean(axis=0)
-        departs = (means < self.lows) | (means > self.highs)
+            reasons[:3] &= np.isin(np.arange(len(self.channels)), waves)
         if len(inputs) <= 8 * self.quarter(dt) or signature.input_map.reference:
-            departs[:] = False
-        reasons = np.vstack([reasons, departs])
+            reasons[3] = False
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
         maps = signature.input_map
         is_place = "surge" in signature.states and (maps.follows or not maps.reference)
