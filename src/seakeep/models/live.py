@@ -215,6 +215,7 @@ class Live:
         self._roles = _roles(signature, roles)
         self._waves = [at for at, name in enumerate(signature.inputs) if name not in self._roles]
         self._follows = signature.input_map.follows
+        # In service only a model that follows its own surge carries waves, in this rig.
         self._own_rig = None if self._follows is None else self._rig
         aligned = signature.input_map.alignment
         if aligned is not None and self._follows is None and aligned.carries_in(self._rig):
@@ -552,10 +553,11 @@ class Live:
         is_exact = bool(seen.all()) and not self._noise.any()
         update = None
         if not is_exact or count.since or at < self._begins:
+            # Unmeasured, errors grow over free runs as long as those of training, and a history.
             settled = self.errors.longest + self.signature.state_delays
             if at < self._begins:
                 kalman.shift(np.diag(scale.spread**2))
-            elif count.partly or count.since < settled:  # or it stays as it is
+            elif count.partly or count.since < settled:
                 kalman.shift()
                 limits = self.errors.at(count.since + 1) ** 2
                 kalman.limit(limits, exactly=not count.partly)
