@@ -7,6 +7,7 @@ may be run again later with the same gains, once a forcing f is known that was a
 """
 
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 from scipy import linalg
@@ -15,7 +16,7 @@ from seakeep.arrays import TINY, BoolArray, FloatArray
 
 
 class DelayFilter:
-    """Covariance and gains of the filter, in place: nothing grows from step to step.
+    """Covariance and gains of the filter.
 
     Parameters
     ----------
@@ -34,8 +35,7 @@ class DelayFilter:
 
     def __init__(self, a: FloatArray, process: FloatArray, noise: FloatArray) -> None:
         self.a, self.process, self.noise = a, process, noise
-        size = a.shape[1]
-        self.covariance, self._next = np.zeros((2, size, size))
+        self.covariance = np.zeros((a.shape[1], a.shape[1]))
 
     def shift(self, newest: FloatArray | None = None) -> None:
         """One step in time.
@@ -43,35 +43,26 @@ class DelayFilter:
         `newest`, shape (N, N), is the covariance of the new sample where it does not depend on
         those before; by default the model predicts it.
         """
-        before, after = self.covariance, self._next
-        count, size = self.a.shape
-        older = size - count
-        after[:older, :older] = before[count:, count:]
+        count, before = len(self.a), self.covariance
+        across = np.zeros((count, len(before) - count))
         if newest is None:
             top = self.a @ before
-            after[older:, :older] = top[:, count:]
-            # Exactly symmetric: an antisymmetric error of rounding would grow.
-            block = top @ self.a.T + self.process
-            after[older:, older:] = 0.5 * (block + block.T)
-        else:
-            after[older:, :older] = 0.0
-            after[older:, older:] = newest
-        after[:older, older:] = after[older:, :older].T
-        self.covariance, self._next = after, before
+            across, newest = top[:, count:], top @ self.a.T + self.process
+        # Exactly symmetric: an antisymmetric error of rounding would grow.
+        block = 0.5 * (newest + newest.T)
+        self.covariance = np.block([[before[count:, count:], across.T], [across, block]])
 
     def limit(self, variances: FloatArray, *, exactly: bool = False) -> None:
         """Scale the newest sample's errors down to variances of shape (N,), or `exactly` to them.
 
         Correlations stay as they are.
         """
-        newest = slice(len(self.covariance) - len(variances), None)
+        newest = slice(-len(variances), None)
         variance = np.diagonal(self.covariance)[newest]
         factor = np.sqrt(variances / np.maximum(variance, TINY))
-        if not exactly:
-            factor = np.minimum(factor, 1.0)
-        rows = self.covariance[newest] * factor[:, None]
-        rows[:, newest] = self.covariance[newest, newest] * np.outer(factor, factor)
-        self.covariance[newest], self.covariance[:, newest] = rows, rows.T  # exactly symmetric
+        scale = np.ones(len(self.covariance))
+        scale[newest] = factor if exactly else np.minimum(factor, 1.0)
+        self.covariance *= np.outer(scale, scale)
 
     def measure(self, seen: BoolArray) -> FloatArray:
         """Update by the rows that were measured.
@@ -111,16 +102,15 @@ class DelayFilter:
         """
         count, size = self.a.shape
         factors = np.tile(raised, size // count)
-        covariance, out = self.covariance * np.outer(factors, factors), np.empty((steps, count))
-        for row, reach in zip(out, reaches(self.a), strict=False):
-            np.einsum("ij,ij->i", reach @ covariance, reach, out=row)
-        return out
+        covariance = self.covariance * np.outer(factors, factors)
+        every = islice(reaches(self.a), steps)
+        return np.stack([np.einsum("ij,ij->i", reach @ covariance, reach) for reach in every])
 
     def added_up(self, steps: int) -> FloatArray:
         """Variances of free runs after `steps` steps, shape (N,), by the process noise alone."""
         count = len(self.a)
         out = np.diagonal(self.process).copy()
-        for _, reach in zip(range(steps - 1), reaches(self.a), strict=False):
+        for reach in islice(reaches(self.a), steps - 1):
             newest = reach[:, -count:]
             out += np.einsum("ij,ij->i", newest @ self.process, newest)
         return out

@@ -255,9 +255,10 @@ def held_out(
         Runs in which there is such a window.
     """
     free = {
-        name: _free_samples(ensemble, name, run, steps) for name, (ensemble, run) in cases.items()
+        name: places
+        for name, (ensemble, run) in cases.items()
+        if (places := _free_samples(ensemble, name, run, steps))
     }
-    free = {name: places for name, places in free.items() if places}
     judged: dict[str, Judged] = {}
     done, total = 0, sum(cases[name][0].n_members for name in free)
     for name, places in free.items():
@@ -265,8 +266,7 @@ def held_out(
         signature = ensemble.signature
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
-        time = np.asarray(run["time"].values, dtype=float)
-        starts = tuple(float(time[at]) for at in places)
+        starts = tuple(run["time"].values[places].astype(float).tolist())
         windows = ensemble.read_windows(run, starts, steps, name=name)
         ((series, lost),) = member_series(ensemble, [windows], executor, tell)
         values = reduce_members(series, lost, level)
@@ -295,11 +295,10 @@ def envelope_of(signature: Signature, windows: Windows) -> FloatArray:
     those at the place of the start.
     """
     count = len(signature.inputs)
-    centre, spread = (
-        part[:count] for part in (signature.input_scale.centre, signature.input_scale.spread)
-    )
-    values = (windows.delayed[..., :count] - centre) / np.where(spread > 0, spread, 1.0)
-    return wave_envelope(values, windows.steps)
+    scale = signature.input_scale.part(slice(count))
+    spread = np.where(scale.spread > 0, scale.spread, 1.0)
+    deviations = (windows.delayed[..., :count] - scale.centre) / spread
+    return wave_envelope(deviations, windows.steps)
 
 
 def _counted(progress: Progress, before: int, total: int, name: str) -> Progress:
@@ -327,29 +326,21 @@ def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) ->
 
 
 def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
-    """Which run of the training this is: the one that holds its samples, else that of its name.
+    """Which run of the training this is: one with the same samples, else that of its name.
 
     A name that was made up for a run without one says nothing.
     """
-    arrays, spans = ensemble.arrays, ensemble.read_spans
-    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
-        if key in spans and _holds(run, ensemble, name, begin, states):
-            return key
-    return name if name in spans and not labelled.is_made_up(name, run) else None
-
-
-def _holds(
-    run: xr.Dataset, ensemble: Ensemble, name: str, begin: float, states: FloatArray
-) -> bool:
-    """Whether a run has the same states at the same instants, as far as both reach."""
+    arrays, spans, signature = ensemble.arrays, ensemble.read_spans, ensemble.signature
     time = np.asarray(run["time"].values, dtype=float)
-    if not time.size:
-        return False
-    ahead = round((begin - time[0]) / ensemble.signature.dt)  # samples before the states
-    values = labelled.channel_matrix(run, ensemble.signature.states, name)
-    here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
-    count = min(len(here), len(there))
-    return count > 0 and np.array_equal(here[:count], there[:count])
+    values = labelled.channel_matrix(run, signature.states, name)
+    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
+        if key in spans and time.size:
+            ahead = round((begin - time[0]) / signature.dt)  # samples before the states
+            here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
+            count = min(len(here), len(there))  # as far as both reach
+            if count > 0 and np.array_equal(here[:count], there[:count]):
+                return key
+    return name if name in spans and not labelled.is_made_up(name, run) else None
 
 
 def calibrated_for(calibration: Calibration | None, level: float) -> Calibration:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import compress
 from typing import Self
 
 import numpy as np
@@ -97,9 +98,8 @@ class Following:
             If a run is shorter than eight encounter periods.
         """
         windows = labelled.last_samples(runs, window)
-        names = [each for each, yes in zip(alignment.inputs, alignment.carried, strict=True) if yes]
-        first_name, first = next(iter(windows.items()))
-        dt, period = labelled.run_step(first, first_name), labelled.mean_period(windows, names)
+        names = [*compress(alignment.inputs, alignment.carried)]
+        dt, period = labelled.common_step(windows), labelled.mean_period(windows, names)
         least = math.ceil(LEAD * period)
         if look_ahead < least and len({alignment.positions[c] for c in alignment.placed}) < 2:
             raise RequestError(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from itertools import compress
@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import xarray as xr
 from scipy import special
 
@@ -46,14 +47,15 @@ from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.forecasts import label_channels, rows_by_name, statistic_coordinate
 from seakeep.models.growth import WINDOWS, LeadErrors, departure, weighed
-from seakeep.models.inputs import Drive, Scale, Signature
+from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.validity import Conditions, Coverage, Validity
 from seakeep.signals.prediction import (
+    Foreseen,
     Jumps,
     close_gaps,
     fill_future,
-    predict_waves,
+    foresee,
     predictable_time,
 )
 
@@ -130,7 +132,7 @@ class _Counts:
     Parameters
     ----------
     taken : int
-        All.
+        All, or as many as have room: the place of the next one among the rows that are kept.
     since : int
         Those since the whole history was measured.
     partly : bool
@@ -208,10 +210,13 @@ class Live:
         self.model, self.signature, self.errors = model, model.signature, errors
         signature = self.signature
         self._rig = _rig(signature, like)
-        self._noise = _noise(signature, noise)
+        self._stated = _noise(signature, noise)
+        self._noise = np.array([self._stated.get(name, 0.0) for name in signature.states])
         self._roles = _roles(signature, roles)
         self._waves = [at for at, name in enumerate(signature.inputs) if name not in self._roles]
         self._follows = signature.input_map.follows
+        # In service only a model that follows its own surge carries waves, in this rig.
+        self._own_rig = None if self._follows is None else self._rig
         aligned = signature.input_map.alignment
         if aligned is not None and self._follows is None and aligned.carries_in(self._rig):
             raise RequestError(
@@ -236,28 +241,22 @@ class Live:
         self._time = math.nan
         # Samples after an instant whose input is needed before its estimate is final.
         self._ahead = signature.lead_samples
-        # Of a model that follows its own surge: the map with its carriers in this rig, and filters
-        # that predict each probe from those up-wave too; rows at all places of the samples to come.
-        self._table = (0, np.empty(0))
+        # Of a model that follows its own surge: filters that predict each probe from those up-wave
+        # too, and rows at all places of the samples to come.
         self._foresight: FloatArray = np.empty(0)
+        self._table: tuple[int, Any] = (0, None)
         if self._follows is not None:
-            self._banks = self._follows.banks(self._rig)
+            self._follows.banks(self._rig)  # refused here where probes stand too far away
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
-        # Rows of samples, `_first` the number of the first; half of the room is always there.
+        # Rows of samples, from the first one on; half of the room is always there.
         longest = max(s, signature.input_delays) + 1
         self._begins = signature.history_samples
         needed = 2 * (self._begins + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
-        inputs, self._first, room = len(signature.inputs), 0, 2 * self._record
-        widths = {
-            "u": inputs,
-            "lost": inputs,
-            "x": count,
-            "y": count,
-            "delayed": signature.input_scale.mean.size,
-            "direct": signature.direct_scale.mean.size,
-        }
-        self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
+        inputs = len(signature.inputs)
+        widths = inputs, inputs, count, count, *(each.mean.size for each in signature.scales[1:])
+        self._rows = [np.full((2 * self._record, width), np.nan) for width in widths]
+        self._u, self._lost, self._x, self._y, self._delayed, self._direct = self._rows
         self._count = _Counts()
         self._jumps, self._jumped = Jumps(self._smoothest()), np.zeros(inputs + count, bool)
         # Of the samples whose estimates are not final; None of a complete sample after complete
@@ -290,7 +289,7 @@ class Live:
     @property
     def state(self) -> FloatArray:
         """Estimate of the states at :attr:`time`, shape (N,), physical units; NaN before that."""
-        return self._recent["x"][max(self._count.taken - 1 - self._first, 0)].copy()
+        return self._x[max(self._count.taken - 1, 0)].copy()
 
     @property
     def covariance(self) -> FloatArray:
@@ -351,8 +350,11 @@ class Live:
         """
         if self._count.taken < 4 or not self.signature.inputs:
             return None
+        states, surge = self.signature.states, None
+        if "surge" in states:
+            surge = self._x[self._kept, states.index("surge")]
         return self.model.coverage.conditions(
-            self._known_inputs(), self.signature, self._surge, waves=self._waves
+            self._known_inputs(), self.signature, surge, waves=self._waves
         )
 
     @property
@@ -385,30 +387,21 @@ class Live:
 
     def _smoothest(self) -> FloatArray:
         """RMS of third differences of inputs and states at least; infinite where they may jump."""
-        coverage, signature = self.model.coverage, self.signature
-        elevations = [at for at in self._waves if is_elevation(signature.inputs[at])]
-        is_wave = np.isin(np.arange(len(signature.inputs)), elevations)
+        signature, waves = self.signature, self._waves
+        is_wave = [at in waves and is_elevation(name) for at, name in enumerate(signature.inputs)]
         moves = [label.units in MOTIONS for label in signature.state_labels]
-        spread = np.concatenate([0.25 * coverage.heights, signature.state_scale.spread])
-        is_smooth = np.concatenate([is_wave, moves]) & (spread > 0)
+        heights = self.model.coverage.heights
+        spread = np.concatenate([0.25 * heights, signature.state_scale.spread])
+        is_smooth = np.array(is_wave + moves) & (spread > 0)
         return np.where(is_smooth, SMOOTH * spread, np.inf)
-
-    @property
-    def _surge(self) -> FloatArray | None:
-        """Estimates of the surge over the record."""
-        if "surge" not in self.signature.states:
-            return None
-        return self._known_inputs("x")[:, self.signature.states.index("surge")]
 
     @property
     def equations(self) -> dict[str, Any]:
         """What the filter computes with, for hosts: x' = offset + a x̂ + b û + d v, oldest first.
 
-        Variances of process and measurement noise, mean and spread of the states, errors of free
-        runs by lead, and what inputs are predicted from: samples of their records, means, gaps that
-        are closed, and filters of a model that follows its own surge.
+        Variances of process and measurement noise, and what inputs are predicted from: samples of
+        their records, gaps that are closed, and filters of a model that follows its own surge.
         """
-        scale = self.signature.state_scale
         return {
             "a": self._a,
             "b": self._b,
@@ -417,25 +410,13 @@ class Live:
             "process": self._filter.process,
             "raised": self._raised,
             "noise": self._filter.noise,
-            "errors": self.errors.rms,
-            "centre": scale.centre,
-            "spread": scale.spread,
             "record": self._record,
-            "means": self.signature.input_scale.mean,
             "gap": self._gap,
             "foresight": self._foresight,
             "waves": self._waves,
             "smoothest": self._jumps.least,
             "doubtful": self._ahead + LATE,
         }
-
-    def _rows(self, name: str, first: int, stop: int) -> FloatArray:
-        """A view of some samples, by their numbers."""
-        return self._recent[name][first - self._first : stop - self._first]
-
-    def _row(self, name: str, at: int) -> FloatArray:
-        """A view of one sample."""
-        return self._recent[name][at - self._first]
 
     @one_blas_thread()
     def step(
@@ -469,31 +450,32 @@ class Live:
             If a length, a name or the time does not fit, or a value is infinite. Nothing has
             changed then, and the same sample can be given again.
         """
-        signature, at = self.signature, self._count.taken
+        signature, count = self.signature, self._count
         instant = self._instant(time)
-        states, sample = _sample("y", y, signature.states), _sample("u", u, signature.inputs)
-        if at < 4 and np.isnan(sample).any():
+        sample = [_sample("u", u, signature.inputs), _sample("y", y, signature.states)]
+        if count.taken < 4 and np.isnan(sample[0]).any():
             raise RequestError(
                 f"inputs that are missing are predicted from the samples before, and there are "
-                f"{at}. Start with at least 4 samples of all of u; of a probe that is dead, with "
-                "its mean, or fit a model without it."
+                f"{count.taken}. Start with at least 4 samples of all of u; of a probe that is "
+                "dead, with its mean, or fit a model without it."
             )
-        self._jumped = self._jumps.of(np.concatenate([sample, states]))
-        sample[self._jumped[: sample.size]] = np.nan
-        states[self._jumped[sample.size :]] = np.nan
-        inputs = self._filled(sample)
-        if at - self._first == 2 * self._record:  # all room is used up
-            for values in self._recent.values():
-                values[: self._record] = values[self._record :]
-            self._first += self._record
-        recent, row = self._recent, at - self._first
-        recent["u"][row], recent["lost"][row], recent["y"][row] = inputs, np.isnan(sample), states
+        row = np.concatenate(sample)
+        self._jumped = self._jumps.of(row)
+        row[self._jumped] = np.nan
+        inputs, states = np.split(row, [len(signature.inputs)])
+        filled = self._filled(inputs)
+        if count.taken == len(self._u):  # all room is used up
+            for rows in self._rows:
+                rows[: self._record] = rows[self._record :]
+            count.taken = self._record
+        at = count.taken
+        self._u[at], self._lost[at], self._y[at] = filled, np.isnan(inputs), states
         # Held until it is estimated: an alignment reads where the vessel is.
-        recent["x"][row] = np.where(np.isfinite(states), states, recent["x"][row - 1])
-        self._count.taken += 1
-        self._count.doubtful = max(self._count.doubtful - 1, 0)
-        if self._jumped[sample.size :].any():
-            self._count.doubtful = self._ahead + LATE
+        self._x[at] = np.where(np.isfinite(states), states, self._x[at - 1])
+        count.taken += 1
+        count.doubtful = max(count.doubtful - 1, 0)
+        if self._jumped[inputs.size :].any():
+            count.doubtful = self._ahead + LATE
         self._time = instant
         self._filtered(at, np.isfinite(states))
         self._settle(at)
@@ -526,15 +508,13 @@ class Live:
         lost = np.isnan(inputs)
         if not lost.any():
             return inputs
-        known = self._known_inputs()
-        if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
-            expected, waves = known[-1].copy(), self._waves
-            expected[waves] = self._foreseen(known[:, waves], 1).expected[0]
-        else:
-            expected = self._expected(known, 1)[0]
-        return np.where(lost, expected, inputs)
+        from_probes = self.ready and self._follows is None
+        foreseen = self._foreseen if from_probes else foresee
+        return np.where(lost, self._expected(self._known_inputs(), 1, foreseen)[0], inputs)
 
-    def _expected(self, known: FloatArray, count: int) -> FloatArray:
+    def _expected(
+        self, known: FloatArray, count: int, foreseen: Callable[..., Foreseen] = foresee
+    ) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
         out, waves = np.repeat(known[-1:], count, axis=0), self._waves
         if self._follows is not None and self.ready:
@@ -544,16 +524,21 @@ class Live:
             out[:, placed] = np.einsum("cqpt,tp->cq", taps[:count], last) + means
             waves = [each for each in waves if each not in placed]
         if waves:
-            out[:, waves] = predict_waves(known[:, waves], count)
+            out[:, waves] = foreseen(known[:, waves], count).expected
         return out
 
-    def _known_inputs(self, name: str = "u") -> FloatArray:
-        """Rows of the record that waves are predicted from: as many as there are, up to so many."""
-        return self._rows(name, max(self._count.taken - self._record, 0), self._count.taken)
+    @property
+    def _kept(self) -> slice:
+        """Samples that waves are predicted from: as many as there are, up to so many."""
+        return slice(max(self._count.taken - self._record, 0), self._count.taken)
+
+    def _known_inputs(self) -> FloatArray:
+        """Inputs of these samples."""
+        return self._u[self._kept]
 
     def _closed(self) -> _Closed:
         """The record with short gaps closed."""
-        record, lost = self._known_inputs().copy(), self._known_inputs("lost") > 0
+        record, lost = self._known_inputs().copy(), self._lost[self._kept] > 0
         for column in self._waves:
             close_gaps(record[:, column], lost[:, column], self._gap)
         lost = lost[:, self._waves]
@@ -562,39 +547,31 @@ class Live:
 
     def _filtered(self, at: int, seen: BoolArray) -> None:
         """Covariance and gain of a sample."""
-        count = self._count
+        count, scale, kalman = self._count, self.signature.state_scale, self._filter
+        count.unseen = 0 if seen.any() else count.unseen + 1
+        count.partly = count.partly or bool(seen.any())
         is_exact = bool(seen.all()) and not self._noise.any()
         update = None
         if not is_exact or count.since or at < self._begins:
-            self._predict_covariance(at, blind=not (count.partly or seen.any()))
-            variances = np.diagonal(self._filter.covariance)[-seen.size :]
+            # Unmeasured, errors grow over free runs as long as those of training, and a history.
+            settled = self.errors.longest + self.signature.state_delays
+            if at < self._begins:
+                kalman.shift(np.diag(scale.spread**2))
+            elif count.partly or count.since < settled:
+                kalman.shift()
+                limits = self.errors.at(count.since + 1) ** 2
+                kalman.limit(limits, exactly=not count.partly)
+            variances = np.diagonal(kalman.covariance)[-seen.size :]
             deviations = np.sqrt(variances + self._noise**2)
-            update = _Update(self._filter.measure(seen), deviations)
+            update = _Update(kalman.measure(seen), deviations)
         self._updates.append(update)
         count.complete = count.complete + 1 if is_exact else 0
-        count.unseen = 0 if seen.any() else count.unseen + 1
-        if count.complete > self.signature.state_delays:
-            if count.since:  # or it is zero already
-                self._filter.covariance.fill(0.0)
-            count.since, count.partly = 0, False
-        elif update:
+        if count.complete <= self.signature.state_delays:
             count.since += 1
-            count.partly = count.partly or bool(seen.any())
-
-    def _predict_covariance(self, at: int, *, blind: bool) -> None:
-        """Covariance of a sample before its measurement.
-
-        While `blind` since the whole history was measured, it stays as it is from free runs as
-        long as those of training on, and a history.
-        """
-        since = self._count.since
-        if blind and since >= self.errors.longest + self.signature.state_delays:
             return
-        if at < self._begins:
-            self._filter.shift(np.diag(self.signature.state_scale.spread**2))
-            return
-        self._filter.shift()
-        self._filter.limit(self.errors.at(since + 1) ** 2, exactly=blind)
+        if count.since:  # or it is zero already
+            kalman.covariance.fill(0.0)
+        count.since, count.partly = 0, False
 
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
@@ -635,7 +612,7 @@ class Live:
         """
         s = self.signature.state_delays
         for at, update in enumerate(self._updates[:count], start=self._pending):
-            measured = self._row("y", at)
+            measured = self._y[at]
             predicted = self.signature.state_scale.centre
             if at >= self._begins:
                 if not is_final:
@@ -651,7 +628,7 @@ class Live:
                 history += (update.gain @ np.where(seen, innovation, 0.0)).reshape(history.shape)
                 exact = np.isfinite(measured) & (self._noise == 0)
                 history[-1][exact] = measured[exact]
-            rows = self._rows("x", max(at - s, 0), at + 1)
+            rows = self._x[max(at - s, 0) : at + 1]
             rows[:] = history[len(history) - len(rows) :]
             if is_final:
                 self._judge(at, update, innovation)
@@ -661,25 +638,25 @@ class Live:
         if self._follows is None:
             return
         place, (first, table) = self._follows.place, self._table
-        surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
+        surge = self._x[at + 1 - place.taps.size : at + 1, self._follows.column]
         (here,) = place.of(surge).tolist()
         on_grid = min((here - place.lowest) / place.spacing, place.highest)
-        read_row(table[at - first], 0, on_grid, self._row("delayed", at))
-        self._row("direct", at)[-1] = (here - place.centre) ** 2
+        read_row(table[at - first], 0, on_grid, self._delayed[at])
+        self._direct[at, -1] = (here - place.centre) ** 2
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
-        delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
+        delayed = self._delayed[at - self.signature.input_delays : at + 1]
         out: FloatArray = self._a @ history.ravel() + self._offset + self._b @ delayed.ravel()
-        return out + self._d @ self._row("direct", at)
+        return out + self._d @ self._direct[at]
 
     def _judge(self, at: int, update: _Update | None, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""
         # What filled lost waves drives no free run; without any, the old ones are forgotten.
-        read = self._rows("lost", max(at - self._begins, self._first), at + self._ahead)
+        read = self._lost[max(at - self._begins, 0) : at + self._ahead]
         is_driven = not read[:, self._waves].any()
         self._innovation, lead = innovation, self._count.lead * is_driven
-        measured = self._row("y", at)
+        measured = self._y[at]
         squares = np.full((2, measured.size), np.nan)
         with undefined():
             squares[0] = (innovation / (update.deviations if update else self._deviations)) ** 2
@@ -701,25 +678,23 @@ class Live:
 
     def _find_rows(self, stop: int, known: FloatArray) -> None:
         """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
-        signature, begins = self.signature, self._begins
+        signature, begins, follows = self.signature, self._begins, self._follows
         first = self._pending - 1
         if first < begins:  # no row was wanted yet
             first = begins - 1 - signature.input_delays
-        if stop <= first:
-            return
-        begin = max(self._count.taken - self._record, 0)
-        delayed, direct = self._rows("delayed", first, stop), self._rows("direct", first, stop)
-        if self._follows is not None:
-            surge = self._known_inputs("x")[:, self._follows.column]
-            drive = Drive(signature.input_map, known, begin, surge, self._banks)
-            table = drive.table(first, stop)
-            self._table = (first, table)
-            delayed[:], direct[:] = drive.rows(first, stop, table)
-            return
+        surge = None if follows is None else self._x[self._kept, follows.column]
         # Direct regressors are wanted from the first prediction on.
-        span = Span(first, max(first, begins - 1), stop)
-        drive = signature.input_map.drive(known, [span], first=begin)
-        delayed[:], direct[:] = drive.rows(first, stop)
+        drive = signature.input_map.drive(
+            known,
+            [Span(first, max(first, begins - 1), stop)],
+            run=self._own_rig,
+            first=self._kept.start,
+            surge=surge,
+        )
+        table = None if follows is None else drive.table(first, stop)
+        self._table = first, table
+        rows = slice(first, stop)
+        self._delayed[rows], self._direct[rows] = drive.rows(first, stop, table)
 
     @one_blas_thread()
     def forecast(
@@ -784,14 +759,14 @@ class Live:
         leads, unseen = self.errors.longest, min(closed.dark, self._count.unseen)
         dark = min(unseen, leads, self._count.taken - self._begins)
         taken = self._count.taken - dark
-        history = self._rows("x", taken - signature.state_samples, taken)
+        history = self._x[taken - signature.state_samples : taken]
         back = signature.input_history + 1 + dark
         windows = engine.array_windows(
             signature,
             np.broadcast_to(history, (len(futures), *history.shape)),
             futures[:, min(self._count.taken, self._record) - back :],
             dark + count,
-            None if self._follows is None else self._rig,
+            self._own_rig,
         )
         ((values, lost),) = engine.member_series(self.model, [windows])
         complete = values[lost.max(axis=1) < 0]
@@ -876,8 +851,7 @@ class Live:
                     f"that {steps} steps need. Give its plan: future = {{'{name}': …}}, or the "
                     "role 'constant'."
                 )
-            last = np.where(np.isfinite(own), np.arange(own.size), 0)
-            own[:] = own[np.maximum.accumulate(last)]
+            own[:] = pd.Series(own).ffill()
         inputs[begin - dark : begin, waves] = np.nan
         if not np.isnan(inputs).any():
             return inputs[None], math.inf, wanted
@@ -908,13 +882,12 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
-        noises = zip(self.signature.states, self._noise.tolist(), strict=True)
         words = {
             "counts": asdict(self._count),
             "as_it_is": [each is None for each in self._updates],
             "time": self._time,
             "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
-            "noise": {name: each for name, each in noises if each},
+            "noise": self._stated,
             "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
@@ -923,11 +896,11 @@ class Live:
 
     def _parts(self) -> list[FloatArray]:
         """Views of all that samples and forecasts to come read."""
-        parts = [self._known_inputs(name) for name in ("u", "lost", "x")]
+        parts = [rows[self._kept] for rows in (self._u, self._lost, self._x)]
         # Of regressors those that the next prediction reads; it finds the last row, and its direct
         # ones, again.
         first = max(self._pending - 1 - self.signature.input_delays, 0)
-        parts += [self._rows(name, first, self._count.taken) for name in ("y", "delayed")]
+        parts += [rows[first : self._count.taken] for rows in (self._y, self._delayed)]
         parts += [each for update in self._updates if update for each in update]
         parts += [self._history, self._free, self._innovation, self._squares, self._jumps.memory]
         if self._count.since:  # or it is zero
@@ -945,15 +918,15 @@ class Live:
     def _restore(self, content: Mapping[str, Any], values: FloatArray) -> None:
         """Restore what :meth:`save` wrote."""
         self._count, self._time = _Counts(**content["counts"]), content["time"]
-        self._first = max(self._count.taken - self._record, 0)
+        self._count.taken = min(self._count.taken, self._record)
         size, count = self._history.size, len(self.signature.states)
         for as_it_is in content["as_it_is"]:
             update = _Update(np.empty((size, count)), np.empty(count))
             self._updates.append(None if as_it_is else update)
         parts = self._parts()
-        ends = np.cumsum([part.size for part in parts])
-        for part, own in zip(parts, np.split(values, ends[:-1]), strict=True):
-            part[:] = own.reshape(part.shape)
+        begins = np.cumsum([part.size for part in parts[:-1]])
+        for part, own in zip(parts, np.split(values, begins), strict=True):
+            part.flat[:] = own
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
@@ -994,8 +967,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
 
 def held_samples(inside: BoolArray) -> IntArray:
     """Leads that are all `inside` from the first on: how many of (steps, N), shape (N,)."""
-    ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
-    return np.argmin(ended, axis=0)
+    return np.logical_and.accumulate(inside).sum(axis=0)
 
 
 def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: float) -> FloatArray:
@@ -1061,12 +1033,14 @@ def _named(what: str, given: object, names: Sequence[str]) -> Mapping[str, Any]:
     return table
 
 
-def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:
-    out, given = np.zeros(len(signature.states)), _named("noise", noise, signature.states)
-    for place, label in enumerate(signature.state_labels):
-        if label.name in given:
-            out[place] = positive(given[label.name], f"noise of {label.name}", label.units)
-    return out
+def _noise(signature: Signature, noise: Mapping[str, float] | None) -> dict[str, float]:
+    """Standard deviations of the measurement noise that is stated."""
+    given = _named("noise", noise, signature.states)
+    return {
+        label.name: positive(given[label.name], f"noise of {label.name}", label.units)
+        for label in signature.state_labels
+        if label.name in given
+    }
 
 
 def _roles(signature: Signature, roles: Mapping[str, str] | None) -> dict[str, str]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy import fft
+from scipy import fft, ndimage
 
 from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, IntArray
 from seakeep.conventions import is_elevation
@@ -21,6 +21,7 @@ from seakeep.core.spectra import split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled
 from seakeep.models.inputs import Signature
+from seakeep.models.labelled import ChannelLabel
 from seakeep.waves import GRAVITY
 
 PER_OCTAVE = 6
@@ -78,8 +79,8 @@ class Conditions:
         Mean, m.
     reach : ndarray, shape (2,)
         Lowest and highest surge in training, m.
-    units : tuple of str
-        Units of the channels.
+    labels : tuple of ChannelLabel
+        Names and units of the channels.
     """
 
     trained: Coverage
@@ -91,7 +92,7 @@ class Conditions:
     means: FloatArray
     surge: float | None
     reach: FloatArray
-    units: tuple[str, ...]
+    labels: tuple[ChannelLabel, ...]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({'; '.join(self.sentences()) or self.validity.words})"
@@ -137,7 +138,8 @@ class Conditions:
     def sentences(self) -> list[str]:
         """A sentence for each reason: periods, heights, steepnesses, means, mean surge."""
         texts: list[list[str]] = [[], [], [], []]
-        for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
+        for at, label in enumerate(self.labels):
+            channel, unit = label.name, label.units
             if self.reasons[0, at]:
                 peak, periods = self.peak[at], self.trained.periods
                 trained = np.flatnonzero(self.trained.shares[at] >= TRAINED)
@@ -218,11 +220,7 @@ class Coverage:
     @cached_property
     def known(self) -> BoolArray:
         """Bands that were trained, and those beside: a taper leaks there. Shape (channel, band)."""
-        trained = self.shares >= TRAINED
-        known = trained.copy()
-        known[:, 1:] |= trained[:, :-1]
-        known[:, :-1] |= trained[:, 1:]
-        return known
+        return ndimage.binary_dilation(self.shares >= TRAINED, [[True, True, True]])
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -276,7 +274,7 @@ class Coverage:
         own = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
         lasts, peak = len(inputs) * dt if duration is None else duration, own.argmax(axis=1)
         repeats = lasts / self.periods[peak]
-        heights, steepnesses = _heights(inputs, dt)
+        means, (heights, steepnesses) = inputs.mean(axis=0), _heights(inputs, dt)
         margin = 1.1 + 1.7 / repeats**0.5
         unseen = np.where(self.known, 0.0, own).sum(axis=1)
         reasons = np.array(
@@ -284,25 +282,23 @@ class Coverage:
                 unseen > 0.5,
                 heights > margin * self.heights,
                 steepnesses > margin * self.steepnesses,
+                (means < self.lows) | (means > self.highs),
             ]
         )
-        reasons &= self.known.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
+        reasons[:3] &= self.known.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         if waves is not None:
-            reasons &= np.isin(np.arange(len(self.channels)), waves)
-        means = inputs.mean(axis=0)
-        departs = (means < self.lows) | (means > self.highs)
+            reasons[:3] &= np.isin(np.arange(len(self.channels)), waves)
         if len(inputs) <= 8 * self.quarter(dt) or signature.input_map.reference:
-            departs[:] = False
-        reasons = np.vstack([reasons, departs])
+            reasons[3] = False
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
         maps = signature.input_map
         is_place = "surge" in signature.states and (maps.follows or not maps.reference)
         if surge is not None and is_place and np.isfinite(surge).any():
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
-        units = tuple(label.units for label in signature.input_labels)
+        labels = signature.input_labels
         return Conditions(
-            self, peak, unseen, heights, steepnesses, reasons, means, mean, reach, units
+            self, peak, unseen, heights, steepnesses, reasons, means, mean, reach, labels
         )
 
 

@@ -136,8 +136,8 @@ def foresee(
     """
     array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
     size, channels = array.shape
-    expected, departures = np.empty((number, channels)), np.zeros((channels, number, channels))
-    orders = np.empty(channels)
+    # What is expected of each channel, and then how innovations of each make it depart.
+    future, orders = np.zeros((number, channels, 1 + channels)), np.empty(channels)
 
     def follow(column: int, values: FloatArray) -> None:
         deviations, first = values - values.mean(), np.zeros(number)
@@ -146,32 +146,28 @@ def foresee(
             order = round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
         whitening, power = autoregression(deviations, order, NOISE)
         first[0], orders[column] = math.sqrt(power), len(whitening) - 1
-        expected[:, column] = values.mean() + continued(deviations, whitening, number)
-        departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
+        future[:, column, 0] += values.mean() + continued(deviations, whitening, number)
+        future[:, column, 1 + column] = scipy.signal.lfilter([1.0], whitening, first)
 
     places = np.broadcast_to(np.asarray(positions, float), channels)
     order = np.argsort(places)[: np.isfinite(places).sum()].tolist()
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])
     for before, here in pairwise(order):
-        left = array[:, here]
+        rest = array[:, here]
         if np.ptp(array[:, before]) > 0:
             apart, limit = places[here] - places[before], band_limit(array[:, before], dt)
-            # Prediction and departures from it, beside one another: carrying is linear.
-            past = np.zeros((size, channels + 1))
+            past = np.zeros((size, 1 + channels))
             past[:, 0] = array[:, before]
-            future = np.column_stack([expected[:, before], departures[:, :, before].T])
-            both = np.concatenate([past, future])
+            both = np.concatenate([past, future[:, before]])  # carrying is linear
             carried = carry_by_dispersion(both, dt, (apart, apart), depth, limit).at(apart)
             slowest = 2 * np.pi * band_limit(array[:, before], dt, SLOWLY)
             settled = min(int(apart / group_speed(slowest, depth) / dt), size // 2)
-            rest = (left - carried[:size, 0])[settled:]
-            if rest.std() <= UNLIKE * left.std():
-                departures[:, :, here] = carried[size:, 1:].T
-                follow(here, rest)
-                expected[:, here] += carried[size:, 0]
-                continue
-        follow(here, left)
+            left = (rest - carried[:size, 0])[settled:]
+            if left.std() <= UNLIKE * rest.std():
+                rest, future[:, here] = left, carried[size:]
+        follow(here, rest)
+    expected, departures = future[..., 0], future[..., 1:].transpose(2, 0, 1)
     return Foreseen(expected, departures, size / max(orders, default=1.0))
 
 
@@ -232,20 +228,15 @@ def close_gaps(record: FloatArray, lost: BoolArray, longest: int) -> None:
     longest : int
         Samples of a gap at most.
     """
-    known, rows = np.flatnonzero(~lost), np.flatnonzero(lost)
-    after = np.searchsorted(known, rows)
-    rows, after = (each[(after > 0) & (after < known.size)] for each in (rows, after))
-    is_short = known[after] - known[after - 1] <= longest + 1
-    rows, places = rows[is_short, None], after[is_short, None] + np.arange(-2, 2)
-    there = (places >= 0) & (places < known.size)  # one may lack at either end of the record
-    near = known[np.clip(places, 0, known.size - 1)]
-    weights = np.where(there, record[near], 0.0)
-    for own in range(4):  # Lagrange's polynomials
-        others = there & there[:, own : own + 1] & (np.arange(4) != own)
-        apart = np.where(others, near[:, own : own + 1] - near, 1)
-        weights[:, own] *= np.where(others, (rows - near) / apart, 1.0).prod(axis=1)
-    record[rows[:, 0]] = weights.sum(axis=1)
-    lost[rows] = False
+    known = np.flatnonzero(~lost)
+    for at in np.flatnonzero((np.diff(known) > 1) & (np.diff(known) <= longest + 1)):
+        near = known[max(at - 1, 0) : at + 3]  # one may lack at either end of the record
+        rows, closed = np.arange(known[at] + 1, known[at + 1]), 0.0
+        for own in near:  # Lagrange's polynomials
+            others = near[near != own]
+            weight = ((rows[:, None] - others) / (own - others)).prod(axis=1)
+            closed = closed + record[own] * weight
+        record[rows], lost[rows] = closed, False
 
 
 def fill_future(

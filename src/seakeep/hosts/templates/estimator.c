@@ -20,7 +20,7 @@ enum {
     LATE = {{ late }},                  /* samples whose estimates waves to come still move */
     RECORD = {{ upper }}_RECORD,
     BEGINS = {{ model.history_samples }},      /* samples before the first prediction */
-    LEADS = {{ errors | length }},
+    LEADS = {{ model.errors.longest }},
     SETTLED = LEADS + OLD / N,  /* samples without a measurement after which errors stay as they are */
     FORE = {{ fore }},                  /* inputs that are predicted before each is from its own record */
     GAP = {{ gap }},
@@ -37,19 +37,19 @@ enum {
 {{ array("process", process) -}}
 {{ array("raised", raised) -}}
 {{ array("noise", noise) -}}
-{{ array("centre", centre) -}}
-{{ array("spread", spread) }}
+{{ array("centre", signature.state_scale.centre) -}}
+{{ array("spread", signature.state_scale.spread) }}
 /* RMS of third differences of inputs and states at least; infinite where they may jump. */
 {{ array("smoothest", smoothest) }}
 /* Errors of free runs in training, a row per sample after the start. */
-{{ array("errors", errors) }}
+{{ array("errors", model.errors.rms) }}
 /* Inputs that are predicted; the others stay at their last value. */
 static const int waves[] = { {% for q in range(Q) %}{{ 1 if q in waves else 0 }}, {% endfor %}0 };
 static const int wave[] = { {% for q in waves %}{{ q }}, {% endfor %}0 };
 {% if follows %}
 /* Weights that predict placed probes from themselves and those up-wave: row, probe, probe, sample, oldest first. */
 {{ array("foresight", foresight) -}}
-{{ array("input_mean", means) }}
+{{ array("input_mean", signature.input_scale.mean) }}
 static const int placed[] = { {{ follows.placed | join(", ") }} };
 enum { PLACED = {{ follows.placed | length }}, TAPS = {{ foresight.shape[3] }} };
 

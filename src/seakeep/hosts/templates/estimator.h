@@ -25,7 +25,7 @@ enum {
     {{ upper }}_EXTENDED = {{ N * (s + 1) }},
     {{ upper }}_RECORD = {{ record }},
     {{ upper }}_ORDER = {{ (record + fore) // 3 }},
-    {{ upper }}_ESTIMATES = {{ late + (errors | length) + ([s + 1, x_rows, past + z + 1] | max) }}
+    {{ upper }}_ESTIMATES = {{ late + model.errors.longest + ([s + 1, x_rows, past + z + 1] | max) }}
 };
 
 /* What of the waves, of the means of inputs or of surge lies outside the training; or whether waves were lost that
