@@ -16,8 +16,8 @@ from seakeep.files import MARK, replacing, write_text
 from seakeep.quality import compared, findings_of
 from seakeep.quality.faults import FLAGS
 from seakeep.report.figures.histories import quality_figure
-from seakeep.report.page import Section, drawing, inline_picture, rendered, section
-from seakeep.report.style import figure_style, shown_unit
+from seakeep.report.page import Drawing, Section, drawing, inline_picture, rendered, section
+from seakeep.report.style import Figure, figure_style, shown_unit
 from seakeep.report.tables import MISSING, Number, number, short, table
 from seakeep.signals.time_axis import ASSUMED, Clock
 
@@ -67,33 +67,34 @@ def clock_rows(run: xr.Dataset) -> Iterator[tuple[str, ...]]:
 
 def write_quality_sheet(
     runs: Datasets, settings: CampaignSettings, title: str, folder: Path, unread: Mapping[str, str]
-) -> list[Path]:
+) -> None:
     """Write the sheet of prepared runs: one self-contained page, and a PNG per run.
 
     Pictures that are newer than ``RUN.nc`` beside them are taken as they are.
     """
-    pictures = {name: folder / f"quality_{name}.png" for name in runs}
-    for name, path in pictures.items():
-        if not is_newer(path, folder / f"{name}.nc"):
-            run, period = runs[name], runs[name].attrs.get("encounter_period", np.nan)
-            pairs = compared(run, redundant_pairs(settings, period))
-            figure = quality_figure(run, {channel: each for (channel, _), each in pairs.items()})
-            with figure_style(), replacing(path) as temporary:  # all colours: marks are small
-                mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
-                figure.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)
     rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
     rows += [(n, Number("not prepared"), MISSING, why) for n, why in unread.items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
-    sections = [section("runs", table("runs", rows, marked=marked))]
-    sections += map(_section, runs, runs.values())
-    drawn = {
-        path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
-        for name, path in pictures.items()
-    }
-    page = folder / "quality.html"
+    sections, drawn = [section("runs", table("runs", rows, marked=marked))], {}
+    for name, run in runs.items():
+        figure = drawing("quality", _picture, run, settings, name=f"quality_{name}", run=name)
+        path = folder / f"{figure.name}.png"
+        if not is_newer(path, folder / f"{name}.nc"):
+            mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
+            with figure_style(), replacing(path) as temporary:  # all colours: marks are small
+                picture = figure.draw()
+                picture.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)
+        drawn[figure.name] = inline_picture(path.read_bytes(), f"channels of {name}")
+        sections.append(_section(name, run, figure))
     content = {"stamp": {}, "sections": sections, "drawn": drawn, "files": False}
-    write_text(page, rendered(kind=SHEET, title=f"Data quality: {title}", **content))
-    return [page, *pictures.values()]
+    text = rendered(kind=SHEET, title=f"Data quality: {title}", **content)
+    write_text(folder / "quality.html", text)
+
+
+def _picture(run: xr.Dataset, settings: CampaignSettings) -> Figure:
+    """Draw the channels of a run, and how its redundant sensors agree."""
+    pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period", np.nan)))
+    return quality_figure(run, {channel: each for (channel, _), each in pairs.items()})
 
 
 def run_row(name: str, run: xr.Dataset) -> tuple[str, Number, Number, str]:
@@ -109,13 +110,12 @@ def other_findings(run: xr.Dataset) -> list[str]:
     return [f"{e.channel}: {e.text}" for e in findings_of(run) if e.channel not in run.data_vars]
 
 
-def _section(name: str, run: xr.Dataset) -> Section:
+def _section(name: str, run: xr.Dataset, figure: Drawing) -> Section:
     """Clocks, findings, channels and picture of a run."""
     clocks = [f"clock of {key}: {run.attrs[f'clock_{key}']}" for key, *_ in clock_rows(run)]
     rows = list(channel_rows(run))
     marked = [k for k, each in enumerate(rows) if each[-1]]
     shown = table("channels_of_run", rows, name=f"channels_{name}", marked=marked, run=name)
-    figure = drawing("quality", quality_figure, run, {}, name=f"quality_{name}", run=name)
     points = [*clocks, *other_findings(run)]
     return Section(name, name, (steps_of(run),), points, figures=(figure,), tables=(shown,))
 

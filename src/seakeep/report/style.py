@@ -46,13 +46,8 @@ DASHED, DOTTED = LINES["forecast"]["linestyle"], (0, (1, 1))
 SERIES = [_line(**each) | {"marker": marker} for marker, each in _STYLE["series"].items()]
 """Colour, dash and marker of each of several things of one kind."""
 
-FLAGGED = {
-    word: {"color": PALETTE[colour], "marker": marker, "markersize": 3.5, "linestyle": "none"}
-    for word, (colour, marker) in _STYLE["flags"].items()
-}
-
-MARKS, TESTS = _STYLE["marks"], _STYLE["tests"]
-"""Measured points, by the kind of the waves; runs, by what they are to a model."""
+FLAGGED, MARKS, TESTS = (_STYLE[what] for what in ("flags", "marks", "tests"))
+"""Flagged samples; measured points, by the kind of the waves; runs, by what they are to a model."""
 
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
@@ -131,16 +126,15 @@ def save_figure(figure: Figure, path: Path) -> Path:
         if kind != "png":
             figure.savefig(temporary, format=kind, metadata={"Creator": f"{MARK}: figure"})
             return path
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from PIL import Image, PngImagePlugin  # comes with matplotlib
 
-        canvas: Any = FigureCanvasAgg(figure)
-        canvas.draw()
-        full = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        # Line drawings lose nothing to a palette and shrink to a third.
+        figure.savefig(temporary, format=kind)
         mark = PngImagePlugin.PngInfo()
         mark.add_text("Software", f"{MARK}: figure")
-        full.quantize(128).save(temporary, format=kind, pnginfo=mark)
+        # Line drawings lose nothing to a palette and shrink to a third.
+        with Image.open(temporary) as full:
+            few = full.convert("RGB").quantize(128)
+        few.save(temporary, format=kind, pnginfo=mark)
     return path
 
 

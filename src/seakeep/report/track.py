@@ -25,12 +25,10 @@ def track_text(track: Track) -> str:
     """CSV with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
     columns = {}
     for name, values in {"time": track.time, **track.channels}.items():
-        unit = "s" if name == "time" else LABELS[name]["units"]
+        factor, unit = displayed("s" if name == "time" else LABELS[name]["units"])
         numbers = np.asarray(values)
-        if unit == "rad":
-            unit, numbers = "deg", np.rad2deg(numbers)
         if np.issubdtype(numbers.dtype, np.floating):
-            numbers = np.round(numbers, DECIMALS[unit]) + 0.0
+            numbers = np.round(factor * numbers, DECIMALS[unit]) + 0.0
         columns[f"{name} [{'-' if unit == '1' else unit}]"] = numbers
     return pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
 

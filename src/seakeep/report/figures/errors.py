@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
@@ -77,10 +78,8 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
 
 def _spans_decades(cells: FloatArray) -> bool:
     """Whether the channels' medians differ by so much that a common axis would hide most."""
-    finite = np.where(np.isfinite(cells), cells, np.nan)
-    known = finite[:, np.isfinite(cells).any(axis=0)]
-    medians = np.nanmedian(known, axis=0)
-    return bool(known.size and medians.max() > DECADE * np.median(medians))
+    medians = pd.DataFrame(cells).where(np.isfinite(cells)).median()
+    return bool(medians.max() > DECADE * medians.median())
 
 
 def _draw_boxes(
@@ -129,9 +128,7 @@ def _draw_boxes(
     axes.set_ylabel(f"{heading} [measured SD]")
     axes.grid(axis="x", visible=False)
     if logarithmic:
-        every = np.concatenate([each for of_model in columns.values() for each in of_model])
-        every = every[np.isfinite(every) & (every > 0)]
-        low, high = 0.8 * every.min(), 1.25 * every.max()
+        low, high = axes.dataLim.intervaly * (0.8, 1.25)
         axes.set_ylim(low, high)
         if high < 100.0 * low:
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

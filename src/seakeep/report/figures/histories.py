@@ -347,15 +347,14 @@ def history_figure(
     names = names or result.channels
     figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    cell = result.tests[test].isel(training=[training], window=[window])
-    if calibration := result.groups.get("calibration"):
-        calibration = calibration.isel(training=[training])
+    calibration = result.groups.get("calibration")
     for each, name in zip(axes, names, strict=True):
-        _draw_channel(each, result, cell, name, calibration)
+        _draw_channel(each, result, (test, training, window), name, calibration)
     words = "deviation from the training mean, in training SD" if len(names) > 1 else "training SD"
     figure.supylabel(words, fontsize=8)
     axes[-1].set_xlabel("time after the last measured state, in encounter periods")
     legend_outside(axes[0], side="upper right")
+    cell = result.tests[test].isel(training=training, window=window)
     run, learnt, start = (cell[key].item() for key in ("run", "training", "start"))
     left_out = result.groups["training"]["left_out"].values[training]
     axes[0].set_title(f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}")
@@ -365,36 +364,34 @@ def history_figure(
 def _draw_channel(
     axes: Any,
     result: StudyResult,
-    cell: xr.Dataset,
+    place: tuple[str, int, int],
     name: str,
     calibration: xr.Dataset | None = None,
 ) -> None:
     """Draw what was measured and the forecasts of all models but baselines."""
-    level = 100 * result.level
-    at = cell.isel(training=0, window=0).sel(channel=name)
+    test, training, window = place
+    part = {"training": [training], "channel": [result.channels.index(name)]}
+    cell = result.tests[test].isel({**part, "window": [window]})
+
+    def standard(values: npt.ArrayLike) -> FloatArray:
+        """Return deviations from the training mean in training SDs."""
+        return (np.ravel(values) - cell["training_mean"].item()) / cell["training_std"].item()
+
     curves = []
     for model in judged_models(result):
-        mean, words, line = at["mean"].sel(model=model), model_words(model), line_of(result, model)
-        if model not in result.ensembles:
-            curves.append(Curve(words, line, _standard(at, mean)))
-            continue
-        band = [_standard(at, at[side].sel(ensemble=model)) for side in ("lower", "upper")]
-        wider = []
-        if calibration:
-            bounds = band_of(cell, model, calibration)
-            wider = [_standard(at, each[0, 0, :, result.channels.index(name)]) for each in bounds]
-            wider = wider if np.isfinite(wider).all() else []
-        title = f"{words} mean"
-        curves.append(Curve(title, line, _standard(at, mean), band, f"{level:g} % band", wider))
+        words, band, wider = model_words(model), [], []
+        if model in result.ensembles:
+            words = f"{words} mean"
+            band = [standard(bound) for bound in band_of(cell, model, None)]
+            if calibration:
+                bounds = band_of(cell, model, calibration.isel(part))
+                wider = [standard(bound) for bound in bounds if np.isfinite(bound).all()]
+        mean, share = standard(cell["mean"].sel(model=model)), f"{100 * result.level:g} % band"
+        curves.append(Curve(words, line_of(result, model), mean, band, share, wider))
     time = cell["time"].values / result.encounter_period
-    draw_history(axes, time, _standard(at, at["measured"]), curves)
+    draw_history(axes, time, standard(cell["measured"]), curves)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
     axes.margins(x=0.005)
-
-
-def _standard(at: xr.Dataset, values: Any) -> Any:
-    """Deviation from the training mean in training SDs."""
-    return (np.asarray(values) - float(at["training_mean"])) / float(at["training_std"])
 
 
 def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
@@ -404,10 +401,9 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
     grid = figure.subplots(len(acts), len(CHANNELS), sharex=True, squeeze=False)
     for row, act in zip(grid, acts, strict=True):
         result = results[act.name]
-        test = result.tests["irregular"]
-        training = test["judged"].values[:, 0].argmax()
+        training = int(result.tests["irregular"]["judged"].values[:, 0].argmax())
         for axes, name in zip(row, CHANNELS, strict=True):
-            _draw_channel(axes, result, test.isel(training=[training], window=[0]), name)
+            _draw_channel(axes, result, ("irregular", training, 0), name)
             axes.set_title(f"{act.title}: {name}")
     for axes in grid[-1]:
         axes.set_xlabel("time after the last measured state, in encounter periods")
@@ -447,7 +443,8 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             filled = over_gaps(x)  # a sample that is not there stands between its neighbours
             for word, bit in FLAGS.items():
                 if (hit := (flags & bit) > 0).any():
-                    at.plot(time[hit], filled[hit], label=word, zorder=3, **FLAGGED[word])
+                    style = {"linestyle": "none", "markersize": 3.5, "zorder": 3, **FLAGGED[word]}
+                    at.plot(time[hit], filled[hit], label=word, **style)
             at.legend(
                 loc="lower right", bbox_to_anchor=(1.0, 0.95), fontsize=7, ncols=6, borderpad=0.1
             )
@@ -496,13 +493,12 @@ def spectrum_figure(result: StudyResult) -> Figure:
     of_drawn = spectra.sel(run=drawn if drawn.size else runs["run"])
     measured = {}
     for kind, length in (("paper", "8.2 s (paper)"), ("recommended", "60 s")):
-        records = entries(of_drawn.sel(kind=kind), "run")
-        of_runs = [at.dropna("bin", subset=["density"]) for at in records]
-        curves = [(at["frequency"].values, at["density"].values) for at in of_runs]
-        measured[kind] = (
-            f"measured, segments of {length}",
-            [each for each in curves if each[0].size],
-        )
+        records = of_drawn.sel(kind=kind)
+        of_runs = (at.dropna("bin", subset=["density"]) for at in entries(records, "run"))
+        curves = [
+            (at["frequency"].values, at["density"].values) for at in of_runs if at["bin"].size
+        ]
+        measured[kind] = f"measured, segments of {length}", curves
     draw_spectra(axes, nominal, measured, runs["wave_frequency"].dropna("run").values)
     long = spectra.sel(kind="recommended")
     peaks = long["frequency"].where(long["density"] == long["density"].max("bin"))
