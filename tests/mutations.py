@@ -377,6 +377,7 @@ CHANGES = {
         ("np.log(upper) / dt", "np.log(upper) * dt", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
     ],
     "models/live.py": [
+        ("(plan > coverage.most)", "(plan > np.inf)", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
         ("np.where(is_smooth, SMOOTH * spread, np.inf)", "SMOOTH * spread", "models/test_live.py::test_a_load_may_jump_and_so_may_an_input_that_is_no_wave"),
         ("np.minimum(self._raised, np.maximum(most, 1.0))", "np.minimum(self._raised, most)", "models/test_live.py::test_before_the_history_is_there_nothing_is_known_of_a_dead_sensor"),
         ("excess = errors.rms[-1]", "excess = errors.rms[0]", "models/test_live.py::test_errors_of_an_estimate_last_as_those_of_free_runs_do"),

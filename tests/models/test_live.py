@@ -594,6 +594,10 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     change = (moved.surge - still.surge).drop_sel(statistic="std")
     # The ridge moves the answer by a millionth.
     assert_allclose(change, [answer] * 3, rtol=0, atol=1e-5)
+    # Extremes of training are −1 and 1, mean and 3 SD about 1.7.
+    for plan_of, word in ((1.2, False), (-1.2, False), (2.2, True), (-2.2, True)):
+        ahead = live.forecast(steps, {"thrust": np.append(plan_of, 0 * plan[1:])})
+        assert ("mean" in ahead.attrs["validity"]) == word
     with request_error(r"'thrust' is a known input, and future gives 3 of"):
         live.forecast(steps, {"thrust": plan[:3]})
     with request_error("roles names 'eat', which the model does not know"):

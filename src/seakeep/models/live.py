@@ -731,10 +731,11 @@ class Live:
             known. Where waves are predicted, the mean tends to that of training as ``std`` comes
             near the SD there, and ``std`` to that, so that no lead errs more than the mean. Where
             waves, means of inputs or mean surge of late lie outside the training, the errors are
-            raised to those of late and by the square of the height; where the consistency of a
-            state exceeds two, its errors are raised by it, and its lead time shrinks.
-            ``attrs["validity"]`` names what lies outside
-            (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones;
+            raised to those of late and by the square of the height; so are they where a plan goes
+            farther than the input did in training. Where the consistency of a state exceeds two,
+            its errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
+            lies outside (:class:`seakeep.models.validity.Validity`), beside the numbers and
+            ``trained_`` ones;
             ``attrs["consistency"]`` is the larger one of each state, at least one.
             ``attrs["predictable"]`` is the time for which the waves at the probe farthest down-wave
             are known from the one farthest up-wave, s
@@ -771,9 +772,14 @@ class Live:
         ((values, lost),) = engine.member_series(self.model, [windows])
         complete = values[lost.max(axis=1) < 0]
         conditions, (late, free) = self.conditions, self.consistency_by_state
+        validity, coverage = self._validity(conditions, closed), self.model.coverage
+        plan = futures[0, len(closed.record) :]
+        beyond = np.delete((plan < coverage.least) | (plan > coverage.most), self._waves, axis=1)
+        if beyond.any():
+            validity |= Validity.MEAN
         worst = np.fmax(np.fmax(late, free), 1.0)
         wider = np.where(worst > ALARM, worst, 1.0)
-        if conditions is not None and conditions.validity:
+        if conditions is not None and (conditions.validity or beyond.any()):
             wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
@@ -806,7 +812,7 @@ class Live:
             "diverged": len(values) - len(complete),
             "predictable": self._predictable(),
             **({} if conditions is None else conditions.attrs()),
-            "validity": self._validity(conditions, closed).words,
+            "validity": validity.words,
             "consistency": worst,
         }
         return xr.Dataset(

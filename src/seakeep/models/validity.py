@@ -196,6 +196,8 @@ class Coverage:
         water of a wave of the mean period; the steepness of what is no elevation has no limit.
     lows, highs : ndarray, shape (channel,)
         Least and greatest mean of a run, less and plus ``FAR`` of its SDs.
+    least, most : ndarray, shape (channel,)
+        Extreme values, or `lows` and `highs` where these lie farther out.
     """
 
     channels: tuple[str, ...]
@@ -205,6 +207,8 @@ class Coverage:
     steepnesses: FloatArray
     lows: FloatArray
     highs: FloatArray
+    least: FloatArray
+    most: FloatArray
 
     @cached_property
     def edges(self) -> FloatArray:
@@ -236,7 +240,9 @@ class Coverage:
         # A constant is itself but for its rounding.
         room = FAR * np.stack([each.std(axis=0) for each in series]) + 1e-9 * np.abs(means)
         lows, highs = (means - room).min(axis=0), (means + room).max(axis=0)
-        return cls(tuple(channels), first, shares, heights, steepnesses, lows, highs)
+        every = np.concatenate([*series, lows[None], highs[None]])
+        ends = every.min(axis=0), every.max(axis=0)
+        return cls(tuple(channels), first, shares, heights, steepnesses, lows, highs, *ends)
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
