@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_pair, positive, time_step, undefined
+from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_pair, positive, ratio, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record, usual_step
 
@@ -93,8 +93,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     views = np.lib.stride_tricks.sliding_window_view(stretch, length)
     centred = reference - reference.mean()
     power = views.std(axis=1) * np.sqrt(length) * np.sqrt(centred @ centred)
-    with undefined():
-        coefficient = np.where(power > 0, (views @ centred) / power, np.nan)
+    coefficient = ratio(views @ centred, power)
     if not np.isfinite(coefficient).any():
         return np.nan, np.nan
     best = int(np.nanargmax(coefficient))
