@@ -244,12 +244,9 @@ class MotionAgreement:
     @property
     def ambiguous(self) -> bool:
         """Whether at `rival_lag` the difference is less than twice that at `lag`."""
-        # Root mean square difference of two series of SD 1.
-        misfit, rival = (
-            math.sqrt(max(2.0 * (1.0 - each), 0.0))
-            for each in (self.correlation, self.rival_correlation)
-        )
-        return rival < 2.0 * max(misfit, FINEST)
+        # Mean square difference of two series of SD 1.
+        misfit, rival = 2.0 * (1.0 - self.correlation), 2.0 * (1.0 - self.rival_correlation)
+        return rival < 4.0 * max(misfit, FINEST**2)
 
 
 def compare_motion(

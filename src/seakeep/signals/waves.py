@@ -5,7 +5,7 @@ Whether a test input repeats a training input, which makes the test meaningless.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -722,9 +722,9 @@ def find_leakage(
             if height >= REPEATED:
                 repeated[start : start + length] = True
                 begin = (part.start + start) * step
-                found.append(Leakage(0.0, height, index, at * step, begin, phase))
-    best = max(found, key=lambda each: each.correlation, default=None)
-    return best and replace(best, share=float(repeated.mean()))
+                found.append((height, index, at * step, begin, phase))
+    best = max(found, key=lambda each: each[0], default=None)
+    return best and Leakage(float(repeated.mean()), *best)
 
 
 def _analytic(series: FloatArray) -> ComplexArray:
