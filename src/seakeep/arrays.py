@@ -204,6 +204,12 @@ def as_pair(
     return a, b
 
 
+def ratio(values: Any, per: FloatArray, without: float = np.nan) -> Any:
+    """Quotient of arrays, and what stands where nothing is divided by."""
+    with undefined():
+        return np.where(per > 0, values / per, without)
+
+
 def finite(array: FloatArray, name: str) -> FloatArray:
     """Return an array of at least one axis as it is; refuse NaN and infinity."""
     there = np.isfinite(array)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, undefined
+from seakeep.arrays import Datasets, FloatArray, ratio, undefined
 from seakeep.check.parts import (
     HERTZ,
     FreeRun,
@@ -16,7 +16,6 @@ from seakeep.check.parts import (
     irregular,
     judged,
     linear_part,
-    ratio,
     read_off,
     regressors,
     used_parts,
@@ -119,7 +118,7 @@ def coherence(
     samples = sum(len(columns) for columns, _ in pieces)
     segment = segment_length(samples, AVERAGES * (len(model.inputs) + 1), period, LONGEST)
     further = cross_spectra(pieces, model.dt, segment)
-    spectra = further.only(range(len(model.inputs)))
+    spectra = further.of_first(len(model.inputs))
     if not spectra.input_power.max() > 0:
         raise DataError(
             f"the inputs ({', '.join(model.inputs)}) hold no energy: they are constant. Look for a "

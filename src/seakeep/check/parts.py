@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, quiet, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
@@ -176,12 +176,6 @@ def gathered(
 def deviations(runs: Mapping[str, FreeRun], kind: str) -> list[FloatArray]:
     """Forecast or measurement ("forecast", "measured") of each free run, less its mean."""
     return [x - x.mean(axis=0) for x in (getattr(run, kind) for run in runs.values())]
-
-
-def ratio(values: FloatArray, per: FloatArray, without: float = np.nan) -> FloatArray:
-    """Quotient, and what stands where nothing is divided by."""
-    with undefined():
-        return np.where(per > 0, values / per, without)
 
 
 def no_energy(names: str) -> DataError:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray
+from seakeep.arrays import Datasets, FloatArray, ratio
 from seakeep.check.parts import (
     HERTZ,
     FreeRun,
@@ -13,7 +13,6 @@ from seakeep.check.parts import (
     free_runs,
     gathered,
     judged,
-    ratio,
     window_of,
 )
 from seakeep.core.spectra import autocorrelation, cross_spectra, input_correlation, ljung_box

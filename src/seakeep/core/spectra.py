@@ -12,7 +12,7 @@ Ljung, System Identification (1999), section 16.6.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ import numpy.typing as npt
 import scipy
 from scipy import signal, stats
 
-from seakeep.arrays import ComplexArray, FloatArray, as_real, number, time_step, undefined
+from seakeep.arrays import ComplexArray, FloatArray, as_real, number, ratio, time_step, undefined
 from seakeep.errors import DataError, RequestError
 
 OVERLAP_CORRELATION = 1 / 36
@@ -59,25 +59,14 @@ class Spectra:
         """Spectra of the inputs, shape (frequency, input)."""
         return np.diagonal(self.inputs, axis1=1, axis2=2).real
 
-    def only(self, inputs: Sequence[int]) -> Spectra:
-        """Those of some of the inputs."""
-        chosen = list(inputs)
-        among = self.inputs[:, chosen][:, :, chosen]
-        return Spectra(self.frequency, among, self.cross[:, chosen], self.outputs, self.averages)
+    def of_first(self, count: int) -> Spectra:
+        """Those of the first inputs alone."""
+        return replace(self, inputs=self.inputs[:, :count, :count], cross=self.cross[:, :count])
 
     def ordinary(self) -> FloatArray:
         """Coherence of each pair, shape (frequency, input, output)."""
         both = self.input_power[:, :, None] * self.outputs[:, None]
-        return _over(np.abs(self.cross) ** 2, both)
-
-    def multiple(self) -> FloatArray:
-        r"""Coherence of each output with all inputs, shape (frequency, output).
-
-        Corrected for what q inputs explain of noise by chance:
-        :math:`1 - (1 - \gamma^2)\,n/(n - q)`, at least zero.
-        """
-        rest = _over(self.unexplained(), self.outputs, 1.0)
-        return np.clip(1.0 - rest, 0.0, 1.0)
+        return ratio(np.abs(self.cross) ** 2, both, 0.0)
 
     def unexplained(self) -> FloatArray:
         """Spectra of what no linear map of the inputs explains, shape (frequency, output)."""
@@ -89,7 +78,7 @@ class Spectra:
                 "a shorter segment."
             )
         # Relative to the power of each input, so that units do not matter.
-        scale = _over(1.0, np.sqrt(self.input_power))
+        scale = ratio(1.0, np.sqrt(self.input_power), 0.0)
         scaled = self.inputs * scale[:, :, None] * scale[:, None]
         cross = self.cross * scale[:, :, None]
         gain = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ cross
@@ -131,14 +120,8 @@ class Spectra:
         freedom = max(2 * self.averages - 2, 1e-3)
         quantile = float(stats.f.ppf(0.95, 2, freedom))
         left = (1.0 - self.ordinary()) * self.outputs[:, None]
-        squares = _over(2 / freedom * quantile * left, power, np.inf)
-        return _over(self.cross, power), np.sqrt(squares)
-
-
-def _over(top: Any, power: FloatArray, without: float = 0.0) -> Any:
-    """Ratio to a power, and what stands `without` any."""
-    with undefined():
-        return np.where(power > 0, top / power, without)
+        squares = ratio(2 / freedom * quantile * left, power, np.inf)
+        return ratio(self.cross, power, 0.0), np.sqrt(squares)
 
 
 def segment_length(samples: float, averages: int, period: float, longest: int) -> int:
@@ -274,15 +257,14 @@ def input_correlation(
         :math:`1.96\sqrt{\sum_k \rho_e(k)\rho_u(k)/n}` (Ljung, equation 16.71), the sum at least
         one, its value for white residuals.
     """
-    samples = sum(len(e) for e, _ in pieces)
-    lags = min(lags, max(len(e) for e, _ in pieces) - 1)
-    residuals, inputs = ([part - part.mean(axis=0) for part in side]
-                         for side in zip(*pieces, strict=True))  # fmt: skip
+    residuals = [e - e.mean(axis=0) for e, _ in pieces]
+    inputs = [u - u.mean(axis=0) for _, u in pieces]
+    samples, lags = sum(map(len, inputs)), min(lags, max(map(len, inputs)) - 1)
     e, u = autocorrelation(residuals, lags), autocorrelation(inputs, lags)
     both = e[:, :, None] * u[:, None]
     limit = 1.96 * np.sqrt(np.maximum(both[0] + 2 * both[1:].sum(axis=0), 1.0) / samples)
-    shaped = ((r[:, :, None], v[:, None]) for r, v in zip(residuals, inputs, strict=True))
-    total = np.sum([_products(*each, lags) for each in shaped], axis=0)
+    both_of = zip(residuals, inputs, strict=True)
+    total = sum(_products(r[:, :, None], v[:, None], lags) for r, v in both_of)
     of_e, of_u = (sum((part**2).sum(axis=0) for part in side) for side in (residuals, inputs))
     with undefined():
         return total / np.sqrt(np.multiply.outer(of_e, of_u)), limit

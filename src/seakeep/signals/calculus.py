@@ -7,7 +7,15 @@ import numpy as np
 import scipy
 from scipy import fft
 
-from seakeep.arrays import ArrayLike, BoolArray, FloatArray, as_pair, as_series, time_step
+from seakeep.arrays import (
+    ArrayLike,
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    as_pair,
+    as_series,
+    time_step,
+)
 from seakeep.errors import RequestError
 from seakeep.signals.time_axis import stretches
 
@@ -61,25 +69,21 @@ def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray
 
 
 def predicted_extension(
-    array: FloatArray, count: int, fitted: int, order: int, whole: int = 0
+    series: FloatArray, count: int, fitted: int, order: int, whole: int = 0
 ) -> FloatArray:
-    """Lengthen series at both ends by linear prediction from their own last samples.
+    """Lengthen a series at both ends by linear prediction from its own last samples.
 
     A record that stops in the middle of a wave is continued by waves, so that a filter with a
     long response is not fed a jump. The continuation fades out as a half cosine once it is `whole`
     samples long.
     """
     window = rising((count - np.arange(float(count))) / (count - whole + 1))
-
-    def lengthened(column: FloatArray) -> FloatArray:
-        values = np.ascontiguousarray(column)
-        before, after = (
-            continued(each, autoregression(each, order)[0], count) * window
-            for each in (values[::-1][-fitted:], values[-fitted:])
-        )
-        return np.concatenate([before[::-1], values, after])
-
-    return np.apply_along_axis(lengthened, 0, array)
+    series = np.ascontiguousarray(series)  # so that a channel has the same bits beside others
+    before, after = (
+        continued(each, autoregression(each, order)[0], count) * window
+        for each in (series[::-1][-fitted:], series[-fitted:])
+    )
+    return np.concatenate([before[::-1], series, after])
 
 
 def expected_in_gaps(series: FloatArray, lost: BoolArray) -> FloatArray:
@@ -118,14 +122,14 @@ def expected_in_gaps(series: FloatArray, lost: BoolArray) -> FloatArray:
 
 
 def _transformed(
-    array: FloatArray, dt: float, slowest: float, name: str
-) -> tuple[FloatArray, FloatArray, Callable[[FloatArray], FloatArray]]:
-    """Frequencies (Hz) and spectra of series continued at either end, and what takes them back.
+    series: FloatArray, dt: float, slowest: float, name: str
+) -> tuple[FloatArray, ComplexArray, Callable[[ComplexArray], FloatArray]]:
+    """Frequencies (Hz) and spectrum of a series continued at either end, and what takes it back.
 
     Refuses a frequency `slowest` (Hz) whose period is so long that eight of them, added to the
     record, take all memory.
     """
-    lasts = dt * len(array)
+    lasts = dt * len(series)
     if slowest * lasts < SHORTEST_RECORD:
         raise RequestError(
             f"{name} ({slowest:g} Hz) has a period of {1 / slowest:g} s, and the record lasts "
@@ -136,13 +140,13 @@ def _transformed(
     # a half of them to separate the slowest wave from a trend.
     padding = math.ceil(8.0 / (slowest * dt))
     order = min(math.ceil(1.6 / (slowest * dt)), 2000)
-    extended = predicted_extension(array, padding, fitted=padding, order=order)
+    extended = predicted_extension(series, padding, fitted=padding, order=order)
     frequency = fft.rfftfreq(len(extended), dt)
 
-    def back(spectrum: FloatArray) -> FloatArray:
-        return fft.irfft(spectrum, n=len(extended), axis=0)[padding:-padding]
+    def back(spectrum: ComplexArray) -> FloatArray:
+        return fft.irfft(spectrum, n=len(extended))[padding:-padding]
 
-    return frequency, fft.rfft(extended, axis=0), back
+    return frequency, fft.rfft(extended), back
 
 
 def band_pass(series: ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
@@ -221,15 +225,17 @@ def integrate(
             f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
             "the slowest wave and above the drift."
         )
-    # Averaged column by column, so that a channel has the same bits alone and beside others.
-    columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
-    columns = columns - columns.mean(axis=1, keepdims=True)
-    frequency, spectrum, back = _transformed(columns.T, dt, low, "the lower edge of the band")
-    # The lower flank is half the lower edge wide, the upper one a fifth of the upper edge.
-    gain = rising((frequency - 0.75 * low) / (0.5 * low))
-    gain *= rising((1.1 * high - frequency) / (0.2 * high))
-    omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
-    return back(spectrum * (gain / (1j * omega) ** times)[:, None]).reshape(array.shape)
+
+    def integral(x: FloatArray) -> FloatArray:
+        centred = x - x.mean()
+        frequency, spectrum, back = _transformed(centred, dt, low, "the lower edge of the band")
+        # The lower flank is half the lower edge wide, the upper one a fifth of the upper edge.
+        gain = rising((frequency - 0.75 * low) / (0.5 * low))
+        gain *= rising((1.1 * high - frequency) / (0.2 * high))
+        omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
+        return back(spectrum * (gain / (1j * omega) ** times))
+
+    return np.apply_along_axis(integral, 0, array)
 
 
 def differentiate(series: ArrayLike, dt: float) -> FloatArray:
@@ -379,10 +385,11 @@ def complementary_filter(
     at = np.arange(x.size) - 0.5 * (x.size - 1)
     slope = at @ x / (at @ at)
     trend = x.mean() + slope * at
-    both = np.column_stack([x - trend, a - a.mean()])
-    frequency, spectrum, back = _transformed(both, dt, crossover, "the crossover")
+    (frequency, position, back), (_, acceleration, _) = (
+        _transformed(each, dt, crossover, "the crossover") for each in (x - trend, a - a.mean())
+    )
     fast = rising((frequency / crossover - 0.75) / 0.5)
     omega = 2j * np.pi * frequency
-    integral = spectrum[:, 1] / np.where(frequency > 0, omega, 1.0) ** times
-    joined = back((1 - fast) * omega ** (2 - times) * spectrum[:, 0] + fast * integral)
+    integral = acceleration / np.where(frequency > 0, omega, 1.0) ** times
+    joined = back((1 - fast) * omega ** (2 - times) * position + fast * integral)
     return joined + (slope / dt if times == 1 else trend)

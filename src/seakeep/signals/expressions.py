@@ -23,13 +23,21 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 GREATEST_EXPONENT = 16
 """A physical law has no higher power; 9**9**9 has."""
 _OPERATORS = {
-    ast.Add: "add",
-    ast.Sub: "subtract",
-    ast.Mult: "multiply",
-    ast.Div: "divide",
-    ast.Pow: "power",
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
 }
-_FUNCTIONS = ("square", "abs", "sqrt", "sin", "cos", "mean", "average")
+
+
+def _average(*values: Any) -> Any:
+    """Mean of several values, instant by instant."""
+    return sum(values[1:], values[0]) / len(values)
+
+
+_FUNCTIONS = {name: getattr(np, name) for name in ("square", "abs", "sqrt", "sin", "cos", "mean")}
+_FUNCTIONS["average"] = _average
 _ALLOWED = "numbers, channel names, + - * / **, parentheses, and the functions " + ", ".join(
     _FUNCTIONS
 )
@@ -116,7 +124,7 @@ class Expression:
                 case ast.Name(name):
                     return channel(self._quoted.get(name, name))
                 case ast.UnaryOp(ast.USub(), operand):
-                    return _apply("negative", [value(operand)])
+                    return np.negative(value(operand))
                 case ast.UnaryOp(ast.UAdd(), operand):
                     return value(operand)
                 case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
@@ -125,11 +133,11 @@ class Expression:
                         raise _RefusedError(
                             node, f"an exponent is a number from -{limit} to {limit}"
                         )
-                    return _apply(_OPERATORS[type(operator)], [value(left), value(right)])
+                    return _OPERATORS[type(operator)](value(left), value(right))
                 case ast.Call(ast.Name(name), arguments, []):
                     if wrong := _wrong_call(name, len(arguments)):
                         raise _RefusedError(node, wrong)
-                    return _apply(name, [value(argument) for argument in arguments])
+                    return _FUNCTIONS[name](*map(value, arguments))
             raise _RefusedError(node)
 
         return value(self._tree)
@@ -185,15 +193,6 @@ class Text:
     sqrt = partialmethod(_of, "sqrt")
     sin = partialmethod(_of, "sin")
     cos = partialmethod(_of, "cos")
-
-
-def _apply(name: str, values: list[Any]) -> Any:
-    """Value of an operation."""
-    return (
-        sum(values[1:], values[0]) / len(values)
-        if name == "average"
-        else getattr(np, name)(*values)
-    )
 
 
 def parse(text: str) -> Expression:

@@ -10,9 +10,9 @@ import numpy as np
 import scipy
 from scipy import special
 
-from seakeep.arrays import ArrayLike, FloatArray, as_real, as_series, number, positive, time_step
+from seakeep.arrays import ArrayLike, FloatArray, as_series, number, positive, time_step
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.time_axis import span_text, uniform_step
+from seakeep.signals.time_axis import check_order, span_text, uniform_step
 
 
 def lowpass_taps(
@@ -186,10 +186,7 @@ def resample(
     True
     """
     array = as_series(series, channels=True)
-    t, wanted = (
-        as_real(instants, f"the times of {what}", DataError)
-        for instants, what in ((time, "the series"), (new_time, "the new time axis"))
-    )
+    t, wanted = check_order(time, "the series"), check_order(new_time, "the new time axis")
     dt, new_dt = uniform_step(t, "the series"), uniform_step(wanted, "the new time axis")
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
@@ -246,9 +243,7 @@ def _sinc_sums(
     rows_at_once = max(1, AT_ONCE // (2 * half))
     for first in range(0, position.size, rows_at_once):
         rows = slice(first, first + rows_at_once)
-        weights = cubic[0, rows, None] * bank[phase[rows]]
-        for each in (1, 2, 3):
-            weights += cubic[each, rows, None] * bank[phase[rows] + each]
+        weights = sum(cubic[each, rows, None] * bank[phase[rows] + each] for each in range(4))
         for column, view in enumerate(views):
             out[rows, column] = np.einsum("ij,ij->i", weights, view[base[rows] + 1])
     return out.reshape((position.size, *array.shape[1:]))

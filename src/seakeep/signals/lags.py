@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_pair, positive, time_step, undefined
+from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_pair, positive, ratio, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record, usual_step
 
@@ -93,8 +93,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     views = np.lib.stride_tricks.sliding_window_view(stretch, length)
     centred = reference - reference.mean()
     power = views.std(axis=1) * np.sqrt(length) * np.sqrt(centred @ centred)
-    with undefined():
-        coefficient = np.where(power > 0, (views @ centred) / power, np.nan)
+    coefficient = ratio(views @ centred, power)
     if not np.isfinite(coefficient).any():
         return np.nan, np.nan
     best = int(np.nanargmax(coefficient))
@@ -245,12 +244,9 @@ class MotionAgreement:
     @property
     def ambiguous(self) -> bool:
         """Whether at `rival_lag` the difference is less than twice that at `lag`."""
-        # Root mean square difference of two series of SD 1.
-        misfit, rival = (
-            math.sqrt(max(2.0 * (1.0 - each), 0.0))
-            for each in (self.correlation, self.rival_correlation)
-        )
-        return rival < 2.0 * max(misfit, FINEST)
+        # Mean square difference of two series of SD 1.
+        misfit, rival = 2.0 * (1.0 - self.correlation), 2.0 * (1.0 - self.rival_correlation)
+        return rival < 4.0 * max(misfit, FINEST**2)
 
 
 def compare_motion(

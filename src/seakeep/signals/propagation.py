@@ -255,8 +255,9 @@ def misplaced_probes(
     Regular waves before a model are left out for a reason: on the measured ship section their
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
-    telling = {name: as_series(elevations[name]) for name in elevations if name in positions}
-    names = sorted(filter(lambda n: _telling(telling[n]), telling), key=positions.__getitem__)
+    known = {name: as_series(each) for name, each in elevations.items() if name in positions}
+    telling = {name: series for name, series in known.items() if _telling(series)}
+    names = sorted(telling, key=positions.__getitem__)
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
@@ -467,15 +468,14 @@ def carry_by_dispersion(
     Above `highest_frequency` (Hz), by default :func:`band_limit`, lie noise and bound crests, whose
     wavenumber goes on along the tangent.
     """
-    array = as_series(series, minimum=4, channels=True)
-    limit = band_limit(array, dt) if highest_frequency is None else highest_frequency
+    limit = band_limit(series, dt) if highest_frequency is None else highest_frequency
     edge = 2 * np.pi * positive(limit, "the highest frequency", "Hz")
 
     def numbers(omega: FloatArray) -> FloatArray:
         beyond = np.maximum(omega - edge, 0.0) / group_speed(edge, depth)
         return wavenumber(np.minimum(omega, edge), depth) + beyond
 
-    return _carried(array, dt, distances, numbers)
+    return _carried(series, dt, distances, numbers)
 
 
 def carry_by_celerity(
@@ -483,12 +483,11 @@ def carry_by_celerity(
 ) -> CarriedElevation:
     """Prepare a record to be carried over a range of distances (m) at one celerity (m/s)."""
     speed = positive(celerity, "the celerity", "m/s")
-    array = as_series(series, minimum=4, channels=True)
-    return _carried(array, dt, distances, lambda omega: omega / speed)
+    return _carried(series, dt, distances, lambda omega: omega / speed)
 
 
 def _carried(
-    array: FloatArray,
+    series: ArrayLike,
     dt: float,
     distances: tuple[float, float],
     numbers: Callable[[FloatArray], FloatArray],
@@ -499,6 +498,7 @@ def _carried(
     coefficients vanish beyond p = kh faster than any power.
     """
     step, (lowest, highest) = time_step(dt), distances
+    array = as_series(series, minimum=4, channels=True)
     flat = array.reshape(len(array), -1)
     mean = flat.mean(axis=0)
     centre, half = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
@@ -509,7 +509,8 @@ def _carried(
     period = 1.0 / max(band_limit(flat, 1.0, 0.5), 2.0 / len(flat))
     whole, order = math.ceil(delay + period), min(math.ceil(2.0 * period), 500)
     padding, fitted = whole + math.ceil(4.0 * period), max(8 * order, 64)
-    extended = predicted_extension(flat - mean, padding, fitted, order, whole)
+    how = (padding, fitted, order, whole)
+    extended = np.apply_along_axis(predicted_extension, 0, flat - mean, *how)
     size = fft.next_fast_len(len(extended), real=True)
     spectrum = fft.rfft(extended, n=size, axis=0)
     k = numbers(2 * np.pi * fft.rfftfreq(size, step))

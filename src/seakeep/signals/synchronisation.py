@@ -135,19 +135,18 @@ def clock_from_pulses(
     >>> round(clock.offset, 4), round(1e6 * clock.drift, 1), clock.count
     (0.3, 20.0, 5)
     """
-    sides = (
-        record(trigger, time, "the logger"),
-        record(reference_trigger, reference_time, "the reference"),
-    )
-    names = "the logger's trigger", "the reference's trigger"
-    pulses = [find_pulses(*side, name) for side, name in zip(sides, names, strict=True)]
-    *chosen, modulus = match_pulses(pulses[0][0], pulses[1][0], expected_offset)
-    matched = [centres[at] for (centres, _), at in zip(pulses, chosen, strict=True)]
-    fast = int(usual_step(sides[1][1]) <= usual_step(sides[0][1]))
-    template = pulse_template(*sides[fast], pulses[fast][1], matched[fast])
-    timed = [time_pulses(*side, at, template) for side, at in zip(sides, matched, strict=True)]
-    (own, reference), errors = (np.stack(each) for each in zip(*timed, strict=True))
-    errors = np.hypot(*errors)
+    logger = record(trigger, time, "the logger")
+    standard = record(reference_trigger, reference_time, "the reference")
+    own, own_width = find_pulses(*logger, "the logger's trigger")
+    reference, width = find_pulses(*standard, "the reference's trigger")
+    own, reference, modulus = match_pulses(own, reference, expected_offset)
+    if usual_step(standard[1]) <= usual_step(logger[1]):
+        template = pulse_template(*standard, width, reference)
+    else:
+        template = pulse_template(*logger, own_width, own)
+    own, own_errors = time_pulses(*logger, own, template)
+    reference, errors = time_pulses(*standard, reference, template)
+    errors = np.hypot(own_errors, errors)
     sound = np.isfinite(errors)
     if not sound.any():
         raise DataError(
@@ -225,8 +224,12 @@ def clock_from_correlation(
             f"{period:.2g} s: they are not those of one clock." + _LAGS.format(largest_lag)
         )
     # Neighbours share a half, so that two windows count as one.
-    errors = {key: math.sqrt(2) * getattr(clock, key) for key in ("offset_error", "drift_error")}
-    return replace(clock, **errors)
+    once = math.sqrt(2)
+    return replace(
+        clock,
+        offset_error=once * clock.offset_error,
+        drift_error=once * clock.drift_error,
+    )
 
 
 def clock_from_shared(
@@ -265,9 +268,11 @@ def clock_from_shared(
     turned = usual_step(c) < usual_step(t)  # the spline is of the faster one
     if turned:
         (a, c), (b, t), offset, rate = (b, t), (a, c), -offset / rate, 1 / rate
+    own_step, step = usual_step(c), usual_step(t)
     # Noise between samples is less than at them, which would draw the instants there.
-    edge = max(_highest_frequency(x, usual_step(times)) for x, times in ((a, c), (b, t)))
-    (a, own_end), (b, end) = (_below(edge, x, usual_step(times)) for x, times in ((a, c), (b, t)))
+    edge = max(_highest_frequency(a, own_step), _highest_frequency(b, step))
+    a, own_end = _below(edge, a, own_step)
+    b, end = _below(edge, b, step)
     other = CubicSpline(t, b)
     whole = (c >= c[0] + own_end) & (c <= c[-1] - own_end)
     centre = float(c.mean())
@@ -284,7 +289,7 @@ def clock_from_shared(
             break
     alike = math.sqrt(max(1.0 - float(left.var() / a[inside].var()), 0.0))
     # Samples of a residual that goes with the slope, as both are waves, count less than once each.
-    lags = min(round(window / usual_step(c)), left.size // 2)
+    lags = min(round(window / own_step), left.size // 2)
     together = np.prod([autocorrelation([x[:, None]], lags) for x in (left, slope)], axis=0)[:, 0]
     summed = np.linspace(2.0, 0.0, lags + 1)[1:] @ np.nan_to_num(together[1:])
     level_error, drift_error = (errors * np.sqrt(max(1.0 + summed, 1.0))).tolist()
@@ -445,8 +450,8 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[Float
 
 def match_pulses(
     own: FloatArray, reference: FloatArray, expected_offset: float
-) -> tuple[IntArray, IntArray, float]:
-    """Indices of the pulses that match in two records (instants, s).
+) -> tuple[FloatArray, FloatArray, float]:
+    """Pulses that match in two records (instants, s).
 
     Also the distance to the next offset that would fit nearly as well, ``inf`` if none does. Of
     offsets that fit equally well, the one nearest to `expected_offset` is taken.
@@ -475,7 +480,7 @@ def match_pulses(
             f"the latter every {usual_step(reference):.4g} s. Check that both columns hold "
             "the same trigger, and the unit of both times."
         )
-    return first, second, modulus
+    return own[first], reference[second], modulus
 
 
 def pulse_template(

@@ -5,7 +5,7 @@ Whether a test input repeats a training input, which makes the test meaningless.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,7 @@ from seakeep.arrays import (
     FloatArray,
     as_series,
     number,
+    ratio,
     time_step,
     whole_number,
 )
@@ -85,8 +86,8 @@ def waves_part(series: ArrayLike, dt: float) -> slice:
     if x.size < 4 * length:
         return slice(begin, end)
     x = x - x.mean()
-    sums = [np.concatenate([[0.0], np.cumsum(x**power)]) for power in (1, 2)]
-    mean, square = ((each[length:] - each[:-length]) / length for each in sums)
+    middle = slice(length // 2, length // 2 + x.size - length + 1)
+    mean, square = (scipy.ndimage.uniform_filter1d(each, length)[middle] for each in (x, x**2))
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
     for _ in range(20):
         moving = np.flatnonzero(spread > STILL * x[begin:end].std())
@@ -551,11 +552,9 @@ def energy_above(series: ArrayLike, dt: float, edge: float) -> tuple[float, floa
     """
     x, step = as_series(series), time_step(dt)
     period = dominant_period(x, step)
-    if not np.isfinite(period):
-        return np.nan, np.nan
     power, lines = tapered_power(x), fft.rfftfreq(x.size, step)
     waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
-    return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
+    return float(ratio(power[waves & (lines > edge)].sum(), power[waves].sum())), period
 
 
 def noise_floor(series: ArrayLike) -> float:
@@ -709,7 +708,7 @@ def find_leakage(
     repeated = np.zeros(record.size, bool)
     pool = [as_series(each, minimum=8) for each in training]
     ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
-    starts = {*range(0, record.size - length + 1, max(length // 2, 1)), record.size - length}
+    starts = {*range(0, record.size - length + 1, length // 2), record.size - length}
     for start in sorted(starts):
         piece = waves[start : start + length]
         for index, reference in ready:
@@ -723,9 +722,9 @@ def find_leakage(
             if height >= REPEATED:
                 repeated[start : start + length] = True
                 begin = (part.start + start) * step
-                found.append(Leakage(0.0, height, index, at * step, begin, phase))
-    best = max(found, key=lambda each: each.correlation, default=None)
-    return best and replace(best, share=float(repeated.mean()))
+                found.append((height, index, at * step, begin, phase))
+    best = max(found, key=lambda each: each[0], default=None)
+    return best and Leakage(float(repeated.mean()), *best)
 
 
 def _analytic(series: FloatArray) -> ComplexArray:
