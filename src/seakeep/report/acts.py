@@ -319,7 +319,7 @@ class Claims(Evidence):
         waves = [*map(self.among, REGULAR)]
         both = [[each.error(k) for each in waves] for k in (self.motions, LOADS)]
         motions, loads = (", ".join(each.text() for each in group) for group in both)
-        better = [a.below_other(b) for a, b in zip(*both, strict=True)]
+        better = [a.below(b) for a, b in zip(*both, strict=True)]
         holds = all_of([*(each.below(USEFUL) for each in both[0]), *better])
         return f"λ/L 1.5, 2, 3: motions {motions}; loads {loads}", holds
 
@@ -349,7 +349,7 @@ class Claims(Evidence):
         errors = [self.among(test).error((line,)) for test in REGULAR]
         slack = [_slack(self.raw.among(test), line) for test in REGULAR]
         falls = [
-            longer.below_other(shorter)
+            longer.below(shorter)
             for (shorter, wet), (longer, dry) in pairwise(zip(errors, slack, strict=True))
             if dry.upper + SLACKER < wet.lower and np.isfinite([longer.value, shorter.value]).all()
         ]
