@@ -115,7 +115,7 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     assert row == ["average", *(f"{float(value):.2f}" for value in expected)]
     windows = result.groups["calibration"]["windows"].sel(ensemble="bayesian").values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
-    plain = coverage_table(result, "bayesian", calibrated=True).note
+    plain = coverage_table(result, "bayesian", "calibrated").note
     assert "not made for" not in plain
     assert "infinite" not in plain
     tests = result.settings["tests"]
@@ -123,13 +123,13 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     table = result.groups["statistics/coverage"]
     table = xr.concat([table, table.assign_coords(test=["long"])], "test")
     groups = {"statistics/coverage": table, "tests/long": result.groups["tests/unseen"]}
-    note = coverage_table(changed(result, groups, tests=tests), "bayesian", calibrated=True).note
+    note = coverage_table(changed(result, groups, tests=tests), "bayesian", "calibrated").note
     assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
     margins = result.groups["calibration"]
     endless = margins["margin"].where(margins["training"] != "t00", np.inf)
     found = changed(result, {"calibration": margins.assign(margin=endless)})
     words = "The calibrated band is infinite in 3 of 6 cases (training set × channel; t00)"
-    assert words in coverage_table(found, "bayesian", calibrated=True).note
+    assert words in coverage_table(found, "bayesian", "calibrated").note
     assert words in " ".join(findings(found))
     assert [words in each.note for each in bands(found).tables] == [False, False, True, True]
 

@@ -110,11 +110,11 @@ class Evidence:
     def cells(
         self, channels: Sequence[str] = (), measure: str = "nrmse", model: str = ENSEMBLE
     ) -> FloatArray:
-        """Errors over (training, window, channel), NaN where not judged."""
+        """Errors over (training, window), averaged over channels; NaN where none is judged."""
         names = list(channels or self.result.channels)
         at = {"model": model, "measure": measure, "channel": names}
         errors = (test["error"].where(test["judged"]).sel(at) for test in self.tests)
-        return np.concatenate([*map(self.ordered, errors)], axis=1)
+        return np.concatenate([self.ordered(each.mean("channel")) for each in errors], axis=1)
 
     def interval(self, statistic: Statistic, *cells: FloatArray, signed: bool = False) -> Interval:
         """A statistic of cells (training, window, …) with its interval."""
@@ -124,7 +124,7 @@ class Evidence:
         return Interval(*map(float, numbers))
 
     def error(self, *of: Any, **named: str) -> Interval:
-        """Median of the errors of :meth:`cells`, averaged over the channels."""
+        """Median of the errors of :meth:`cells`."""
         return self.interval(_median, self.cells(*of, **named))
 
     def variant(self, key: str, variant: str) -> FloatArray:
@@ -133,41 +133,33 @@ class Evidence:
         return self.ordered(data.expand_dims("window"))
 
 
-def _flat(drawn: FloatArray) -> FloatArray:
-    """All cells of each series."""
-    return drawn.reshape(len(drawn), -1)
-
-
 def _mean(drawn: FloatArray) -> FloatArray:
     """Average over all cells of each series."""
-    return average_of(_flat(drawn))
-
-
-def _middle(drawn: FloatArray) -> FloatArray:
-    """Median over all cells of each series."""
-    return median_of(_flat(drawn))
+    return average_of(drawn.reshape(len(drawn), -1))
 
 
 def _median(drawn: FloatArray) -> FloatArray:
-    """Median over cells (series, training, window, channel) of the average over channels."""
-    return _middle(average_of(drawn))
+    """Median over all cells of each series."""
+    return median_of(drawn.reshape(len(drawn), -1))
 
 
 def _spread(drawn: FloatArray) -> FloatArray:
-    """Inter-quartile range over cells of the average over channels."""
-    low, high = np.nanquantile(_flat(average_of(drawn)), [0.25, 0.75], axis=1)
+    """Inter-quartile range over all cells of each series."""
+    low, high = np.nanquantile(drawn, [0.25, 0.75], axis=(1, 2))
     return high - low
 
 
 def _share(act: Evidence, measure: str, channels: Sequence[str]) -> Interval:
     """Fraction of the average error that some channels make."""
     picked = np.isin(act.result.channels, channels)
+    (test,) = act.tests
+    errors = test["error"].where(test["judged"]).sel(model=ENSEMBLE, measure=measure)
 
     def statistic(drawn: FloatArray) -> FloatArray:
         means = average_of(drawn.reshape(len(drawn), -1, drawn.shape[-1]).swapaxes(1, 2))
         return means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
 
-    return act.interval(statistic, act.cells(measure=measure))
+    return act.interval(statistic, act.ordered(errors))
 
 
 def _ratio(statistic: Statistic) -> Statistic:
@@ -228,7 +220,7 @@ class Claims(Evidence):
 
     def _robust(self) -> Judged:
         own, fir = (self.error(model=model) for model in (ENSEMBLE, "fir"))
-        worst = float(np.nanmax(average_of(self.cells())))
+        worst = float(np.nanmax(self.cells()))
         words = f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}"
         return words, all_of([own.below(USEFUL), worst < 1.0])
 
@@ -307,7 +299,7 @@ class Claims(Evidence):
         both = test["measured"].values, self.raw.ordered(test["mean"])
         measured, forecast = (split_bands(values, result.dt, edge)[0] for values in both)
         errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-        bow, stern = (self.raw.interval(_median, errors[..., [k]]) for k in range(2))
+        bow, stern = (self.raw.interval(_median, errors[..., k]) for k in range(2))
         words = f"act (b): bow {bow.text()}, stern {stern.text()}"
         return words, all_of([bow.below(1.0), stern.below(1.0)])
 
@@ -319,14 +311,14 @@ class Claims(Evidence):
         waves = [*map(self.among, REGULAR)]
         both = [[each.error(k) for each in waves] for k in (self.motions, LOADS)]
         motions, loads = (", ".join(each.text() for each in group) for group in both)
-        better = [a.below_other(b) for a, b in zip(*both, strict=True)]
+        better = [a.below(b) for a, b in zip(*both, strict=True)]
         holds = all_of([*(each.below(USEFUL) for each in both[0]), *better])
         return f"λ/L 1.5, 2, 3: motions {motions}; loads {loads}", holds
 
     def _against_irregular(self) -> Judged:
         both = self.among(*SEA, *REGULAR)
         sizes = [test.sizes["window"] for test in both.tests]
-        is_regular = np.repeat([False, *[True] * len(REGULAR)], sizes)[:, None]
+        is_regular = np.repeat([False, *[True] * len(REGULAR)], sizes)
         changes = []
         for key in HEADING:
             cells = both.cells((), key)
@@ -340,8 +332,8 @@ class Claims(Evidence):
         order, _ = training_order(self.result.groups["training"])
         cells, is_load = np.concatenate(leads, axis=1)[order], np.isin(self.result.channels, LOADS)
         both, interval = (cells[..., is_load], cells[..., ~is_load]), self.among(*REGULAR).interval
-        loads, motions = (interval(_middle, each).text(0, "°") for each in both)
-        more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
+        loads, motions = (interval(_median, each).text(0, "°") for each in both)
+        more = interval(lambda a, b: _median(a) - _median(b), *both, signed=True)
         return f"median |phase|: loads {loads}, motions {motions}", more.above(0.0)
 
     def _stern(self) -> Judged:
@@ -349,7 +341,7 @@ class Claims(Evidence):
         errors = [self.among(test).error((line,)) for test in REGULAR]
         slack = [_slack(self.raw.among(test), line) for test in REGULAR]
         falls = [
-            longer.below_other(shorter)
+            longer.below(shorter)
             for (shorter, wet), (longer, dry) in pairwise(zip(errors, slack, strict=True))
             if dry.upper + SLACKER < wet.lower and np.isfinite([longer.value, shorter.value]).all()
         ]
@@ -359,18 +351,18 @@ class Claims(Evidence):
 
     def _stable(self) -> Judged:
         radii = (self.variant("radius", each) for each in ("ridge", "none"))
-        ours, none = (self.interval(_middle, each) for each in radii)
+        ours, none = (self.interval(_median, each) for each in radii)
         words = f"spectral radius {ours.text()} with λ, {none.text()} without"
         return words, all_of([ours.below(1.0), none.above(1.0)])
 
     def _cheaper(self) -> Judged:
         svd, ours = (self.variant("seconds", each) for each in ("truncated", "ridge"))
-        times = self.interval(_middle, svd / ours)
+        times = self.interval(_median, svd / ours)
         return f"the SVD takes {times.text(0)} times as long", times.above(1.0)
 
     def _robust_to_noise(self) -> Judged:
         data = self.result.groups[f"regularisation/{SINGLE}"]
-        truncated = self.ordered(data["truncated_nrmse"])
+        truncated = self.ordered(data["truncated_nrmse"].mean("channel"))
         ratio = self.interval(_ratio(_median), self.cells(model=SINGLE), truncated)
         rank = int(data["rank"].median())
         return f"ANRMSE {ratio.change()} from {rank} singular values to λ", ratio.below(1.0)

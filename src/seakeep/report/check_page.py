@@ -23,13 +23,9 @@ from seakeep.report.tables import (
     interval,
     number,
     numbers,
-    percent,
-    probability,
     ratio_of,
     row,
-    short,
     table,
-    uncertain,
 )
 
 OVERSHOOT = 1.1
@@ -67,9 +63,9 @@ def worth_section(result: xr.Dataset, checked: Checked) -> Section:
         ]
     verdicts = []
     for own in entries(result.isel(state=slice(1, None)), "waves", "state"):
-        beside = (MISSING, MISSING, MISSING)
-        if best := own["best"].item():
-            beside = (best, number(own["nrmse"].sel(model=best)), _change(own, best))
+        best, beside = own["best"].item(), (MISSING,) * 3
+        if best:
+            beside = best, number(own["nrmse"].sel(model=best)), _change(own, best)
         use = USES.get(float(own["limit"]), "not judged").partition(" (")[0]
         verdicts.append((*row(own, "state", "waves"), *_cells(own, "nrmse")[:2], *beside, use))
     one, runs = result.attrs["of"].removesuffix("s"), result["run"].values
@@ -176,17 +172,8 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
         # Those of irregular waves stand in the figure.
         at = measured.sel(point=measured["kind"] == "regular")
         at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
-        points = [
-            (
-                *row(own, "run", frequency=3, wave_amplitude=4),
-                *row(own, "shown"),
-                *(uncertain(own[k], own[f"{k}_uncertainty"]) for k in ("amplitude", "phase")),
-            )
-            for own in entries(
-                _as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state"
-            )
-        ]
-        tables.append(table("measured_response", points))
+        shown = _as_shown(at, "amplitude", "amplitude_uncertainty")
+        tables.append(table("measured_response", entries(shown, "point", "state")))
         if "irregular" in measured["kind"]:
             words.append(
                 "Points of irregular waves are of all runs, training included. Their bars hold "
@@ -211,30 +198,26 @@ def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
 
 def _validation_table(result: xr.Dataset) -> Table:
     """E and u_val of each state: over the regular runs one by one, irregular points together."""
+    shown = _as_shown(result.rename(uncertainty="error_uncertainty"), "error", "error_uncertainty")
     rows = []
-    for own in entries(_as_shown(result, "error", "uncertainty"), "state"):
+    for own in entries(shown, "state"):
         for kind in ("regular", "irregular"):
             at = own.sel(point=(own["kind"] == kind) & np.isfinite(own["error"]))
-            if not at.sizes["point"]:
-                continue
-            error = at["error"]
-            worst = at.isel(point=(abs(error) - at["uncertainty"]).argmax("point"))
-            counts = numbers([error.size, int(at["within"].sum())], 0)
-            rms, place = short(np.sqrt(np.mean(error**2))), number(worst["frequency"])
-            by = uncertain(worst["error"], worst["uncertainty"])
-            rows.append((*row(own, "shown"), kind, *counts, rms, place, by))
+            if at.sizes["point"]:
+                beyond = abs(at["error"]) - at["error_uncertainty"]
+                rms = np.sqrt((at["error"] ** 2).mean())
+                sums = {"points": at.sizes["point"], "passed": at["within"].sum(), "rms": rms}
+                rows.append(at.isel(point=beyond.argmax("point")).assign(sums))
     return table("validation", rows)
 
 
 def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return coherence, and the least error of a linear map beside the model's."""
-    rows, trained = [], checked.results.get("training_coherence")
     advice, unjudged = defaultdict(list), defaultdict(list)
     worth, segment = checked.results.get("worth"), result.attrs["segment"]
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
     for state in result["state"].values:
         own = result.sel(state=state)
-        rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each]
         if own["still"]:
             unjudged["it stands still in these runs"].append(state)
         elif own["period"] > segment / 3:
@@ -258,15 +241,16 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
             f"the bounds of {state}, and of what follows it, are higher."
         )
     figure = drawing("coherence", checks.coherence, result)
-    return section("coherence", figure, table("possible", rows), points=points, **result.attrs)
+    rows = table("possible", _beside_training(result, checked.results.get("training_coherence")))
+    return section("coherence", figure, rows, points=points, **result.attrs)
 
 
-def _bounds(own: xr.Dataset) -> tuple[str, ...]:
-    """Error of a state, and its bounds with their intervals."""
-    cells = []
-    for key in ("linear_bound", "observables_bound"):
-        cells += [number(own[key]), interval(own, key)] if key in own else [MISSING] * 2
-    return (*row(own, "state"), own.attrs["of"], number(own["nrmse"]), *cells)
+def _beside_training(result: xr.Dataset, trained: xr.Dataset | None) -> Iterator[xr.Dataset]:
+    """Each state of a result, and after it the same of training, where there is one."""
+    for state in result["state"].values:
+        for each in (result, trained):
+            if each:
+                yield each.sel(state=state).assign(of=each.attrs["of"])
 
 
 def _advice(model: float, linear: float, more: float, ahead: bool, turned: bool) -> str:
@@ -321,30 +305,26 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
             "forecast leans on the waves and forgets the state."
         )
-    rows = []
+    taken = []
     for own in entries(modes, "mode"):
         shares = own["participation"].to_series().nlargest(2)
         taking = ", ".join(f"{state} {part:.2f}" for state, part in shares.items())
-        rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
+        taken.append(own.assign(taking=taking))
     figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
-    listed = table("modes", rows, modes=len(rows))
+    listed = table("modes", taken, modes=len(taken))
     return section("modes", decay, shown, figure, listed, more=words, points=points)
 
 
 def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return whiteness, past inputs, bands and age of the errors."""
     lag, period = result["lag"].values, result.attrs["encounter_period"]
-    both, rows = (result, checked.results.get("training_residuals")), []
-    parts = (each.sel(state=k) for k in result["state"].values for each in both if each)
-    for own in parts:
-        beyond = MISSING
+    rows = []
+    for own in _beside_training(result, checked.results.get("training_residuals")):
         if "input_correlation" in own:
-            part = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
-            beyond = Number(f"{percent(part)} %")
-        tests = row(own, one_step=4, ljung_box=0, probability=probability)
-        ages = own["age_nrmse"][[own.sizes["lag"] - 2, -1]]
-        errors = (*numbers(own["band_nrmse"]), *numbers(ages))
-        rows.append((*row(own, "state"), own.attrs["of"], *tests, beyond, *errors))
+            own["beyond"] = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
+        errors = (*own["band_nrmse"], *own["age_nrmse"][[own.sizes["lag"] - 2, -1]])
+        names = ("slow", "wave", "above", "first", "last")
+        rows.append(own.assign(dict(zip(names, errors, strict=True))))
     shown = table(
         "residuals",
         rows,
@@ -362,34 +342,27 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
     extreme = ("extreme", "extreme_lower", "extreme_upper")
-    scaled = _as_shown(result, "mean", "significant_double_amplitude", *extreme)
-    rows = []
-    for own in entries(scaled, "state", "kind"):
-        bounds = interval(own, "extreme", short)
-        rows.append(
-            (
-                *row(own, "shown", "kind", mean=short, significant_double_amplitude=short),
-                *row(own, zero_crossing_period=3, peaks=0, weibull_shape=2),
-                MISSING if bounds == MISSING else short(own["extreme"]),
-                bounds,
-                number(own["divergence"], 4) if own["kind"] == "forecast" else MISSING,
-            )
-        )
+    shown = _as_shown(result, "mean", "significant_double_amplitude", *extreme)
+    # An extreme counts with its interval, and a divergence is that of the forecast.
+    known = shown["extreme_lower"].notnull() & shown["extreme_upper"].notnull()
+    shown["extreme"] = shown["extreme"].where(known)
+    shown["divergence"] = shown["divergence"].where(shown["kind"] == "forecast")
     return section(
         "statistics",
         drawing("exceedance", checks.exceedance, result),
         drawing("density", checks.density, result),
-        table("statistics", rows, of=result.attrs["of"], hours=result.attrs["duration"] / 3600),
+        table(
+            "statistics",
+            entries(shown, "state", "kind"),
+            of=result.attrs["of"],
+            hours=result.attrs["duration"] / 3600,
+        ),
     )
 
 
 def validity_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return where each test lies against the training."""
-    rows = [
-        row(at, "run", "part", "waves", height=3, period=2, steepness=4, drift=3)
-        for at in entries(result, "run", "part")
-        if np.isfinite(at["height"])
-    ]
+    rows = (at for at in entries(result, "run", "part") if np.isfinite(at["height"]))
     points = [
         f"{run}: {why}. What the model says there is an extrapolation."
         for run, why in _outside(result)
@@ -408,14 +381,12 @@ def validity_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the second order: mean drift and slow response per amplitude squared."""
-    rows = []
+    rows: list[xr.Dataset] = []
     if "offset" in result:
         shown = _as_shown(result, "slow_response", "offset", "offset_uncertainty")
         for own in entries(shown.dropna("state", how="all", subset=["slow_response"]), "state"):
             model = own["slow_response"][0].interp(frequency=own["point_frequency"])
-            for at in entries(own.assign(model=model), "point"):
-                offset = uncertain(at["offset"], at["offset_uncertainty"])
-                rows.append((*row(at, "shown", "run", point_frequency=3, model=4), offset))
+            rows += entries(own.assign(model=model), "point")
     return section(
         "drift", drawing("drift", checks.drift, result), table("drift", rows), **result.attrs
     )

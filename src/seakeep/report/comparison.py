@@ -23,6 +23,7 @@ from seakeep.report.tables import (
     Table,
     band_verdict,
     band_words,
+    by_channel,
     entries,
     interval,
     number,
@@ -32,6 +33,7 @@ from seakeep.report.tables import (
     row,
     short,
     shorter,
+    table,
     write_frame,
 )
 
@@ -72,11 +74,8 @@ def _by_channel(
     at: xr.Dataset, name: str, title: str, columns: Iterable[Iterable[str]], note: str = ""
 ) -> Table:
     """A row per channel of a run, and one of averages where columns have it; headings first."""
-    run, names = at["run"].values, [*map(str, at["channel"].values)]
-    every = [[*column] for column in columns]
-    averages = [len(names)] if len(every[0]) > 1 + len(names) else []
-    heads, *rows = zip(["channel", *names, *["average"] * len(averages)], *every, strict=True)
-    return Table(f"{name}_{run}", f"{run}: {title}", heads, rows, note, averages=averages)
+    run, parts = at["run"].item(), by_channel(at["channel"].values, columns)
+    return Table(f"{name}_{run}", f"{run}: {title}", note=note, **parts)
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
@@ -105,46 +104,37 @@ def _note(at: xr.Dataset) -> str:
 def model_blocks(tables: Datasets) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     name, first = next(iter(tables.items()))
-    heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
-        rows, status, ahead = [], [], []
-        for model, table in tables.items():
-            at = table.sel(run=run)
-            error, *others = row(at, anrmse=3, training_anrmse=3, mean_nammae=3)
-            rows.append((model, error, interval(at, "anrmse"), *others))
-            if at["status"] != "ok":
-                status.append(f"{model}: {at['status'].values}")
-            if words := look_ahead_words(float(at["look_ahead"])):
-                ahead.append(f"{model} {words}")
-        title = f"{run}: models against measurement{_scale_words(first)}"
-        yield Table(f"models_{run}", title, heads, rows, "; ".join(status + ahead))
-        errors = ([model, *numbers(each["nrmse"].sel(run=run))] for model, each in tables.items())
-        at = first.sel(run=run)
-        yield _by_channel(at, "channels", "NRMSE", errors)
-        yield _extremes(at, f"extremes of {name}")
+        models = {model: each.sel(run=run) for model, each in tables.items()}
+        said = [f"{m}: {at['status'].item()}" for m, at in models.items() if at["status"] != "ok"]
+        ahead = {m: look_ahead_words(float(at["look_ahead"])) for m, at in models.items()}
+        said += [f"{model} {words}" for model, words in ahead.items() if words]
+        rows = [at.assign(model=model) for model, at in models.items()]
+        given = {"name": f"models_{run}", "run": run, "scale": _scale_words(first)}
+        yield table("models_of_run", rows, "; ".join(said), **given)
+        errors = ([model, *numbers(at["nrmse"])] for model, at in models.items())
+        yield _by_channel(models[name], "channels", "NRMSE", errors)
+        yield _extremes(models[name], f"extremes of {name}")
 
 
-def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
+def difference_blocks(differences: xr.Dataset) -> Iterator[Table]:
     """Errors of several models run by run, and over all runs their change from the first one."""
-    models, runs = (table[key].values.tolist() for key in ("model", "run"))
+    models, runs = (differences[key].values.tolist() for key in ("model", "run"))
     of = runs[0]
     if len(runs) > 1:
         of = f"{len(runs)} runs"
         rows = [
             (*row(at, "run", wave_period=shorter), *numbers(at["anrmse"]))
-            for at in entries(table.sortby("wave_period"), "run")
+            for at in entries(differences.sortby("wave_period"), "run")
         ]
-        rows.append(("mean", "", *numbers(table["all_anrmse"])))
-        heads = ("run", "waves, s", *models)
-        title = f"{of} by wave period: ANRMSE{_scale_words(table)}"
-        yield Table("by_run", title, heads, rows, averages=[len(runs)])
+        rows.append(("mean", "", *numbers(differences["all_anrmse"])))
+        heads, scale = ("run", "waves, s", *models), _scale_words(differences)
+        yield table("by_run", rows, columns=heads, averages=[len(runs)], of=of, scale=scale)
     changes: list[tuple[str, ...]] = []
-    for at in entries(table, "model"):
+    for at in entries(differences, "model"):
         cells = ratio_of(at, "all_").cells() if changes else ("", "", "")
         changes.append((*row(at, "model", all_anrmse=3), *cells))
-    note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
-    heads = ("model", "ANRMSE", "change", "95 %", "verdict")
-    yield Table("differences", f"{of}: change of ANRMSE from {models[0]}", heads, changes, note)
+    yield table("changes", changes, name="differences", of=of, first=models[0])
 
 
 def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
@@ -181,30 +171,30 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     of_all = {name: str(name)[4:] for name in table.data_vars if str(name).startswith("all_")}
     every = table[[*of_all]].rename(of_all).expand_dims(run=[""])
     each = table.drop_vars(of_all)
-    both = [part.to_dataframe().reset_index() for part in (each, every)]
-    return _write(both, ["run", "wave_period", "model"], path)
+    frames = [part.to_dataframe().reset_index() for part in (each, every)]
+    return _write(pd.concat(frames), ["run", "wave_period", "model"], path)
 
 
 def write_comparison(tables: Datasets, path: Path) -> Path:
     """Write comparison tables as CSV, a row per run and channel, full precision."""
     ordered = {name: table.transpose("run", "channel") for name, table in tables.items()}
-    return _write(_frames(ordered), ["run", "channel", "channel_units", "model"], path)
+    return _write(_below(ordered), ["run", "channel", "channel_units", "model"], path)
 
 
 def write_nowcasts(nowcasts: Datasets, path: Path) -> Path:
     """Write all errors as CSV, a row per model, run, channel and lead, full precision."""
     keys = HEADER.split(",")
-    return _write(_frames({name: each[keys[4:]] for name, each in nowcasts.items()}), keys, path)
+    return _write(_below({name: each[keys[4:]] for name, each in nowcasts.items()}), keys, path)
 
 
-def _frames(tables: Datasets) -> list[pd.DataFrame]:
-    """Tables of several models, a column says which."""
-    return [each.to_dataframe().reset_index().assign(model=name) for name, each in tables.items()]
+def _below(tables: Datasets) -> pd.DataFrame:
+    """Tables of several models below each other; a column says which."""
+    frames = {name: each.to_dataframe() for name, each in tables.items()}
+    return pd.concat(frames, names=["model"]).reset_index()
 
 
-def _write(parts: Sequence[pd.DataFrame], front: list[str], path: Path) -> Path:
-    """Write tables below each other as CSV, some of their columns first."""
-    table = pd.concat(parts)
+def _write(table: pd.DataFrame, front: list[str], path: Path) -> Path:
+    """Write a table as CSV, some of its columns first."""
     return write_frame(table[[*front, *table.columns.difference(front, sort=False)]], path)
 
 

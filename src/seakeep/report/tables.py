@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
 
@@ -15,7 +14,8 @@ import numpy.typing as npt
 import pandas as pd
 import xarray as xr
 
-from seakeep.files import replacing, write_text
+from seakeep.files import replacing, templates, write_text
+from seakeep.report.style import model_words
 from seakeep.toml import packaged
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ class Number(str):
 
 
 MISSING = Number("–")
-Form = Callable[[SupportsFloat], Number]
+Form = int | str | Callable[[SupportsFloat], Number]
+"""How a number is written: its decimals, a format of Python, or a function."""
 
 
 @dataclass(frozen=True)
@@ -84,15 +85,17 @@ WORDS = packaged("report/templates/words.toml")
 """Words of the pages: sections, figures and tables by name."""
 
 
-def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any) -> Table:
+def table(
+    key: str, rows: Iterable[Sequence[str] | xr.Dataset], more: str = "", **given: Any
+) -> Table:
     """Return a table with the words of ``words.toml``.
 
     Parameters
     ----------
     key : str
         Its place there.
-    rows : sequence of sequence of str
-        Cells.
+    rows : iterable of sequence of str or Dataset
+        Cells of each row, or an entry that holds the variables that the columns name there.
     more : str, optional
         What follows the note.
     **given
@@ -103,17 +106,41 @@ def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any)
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key]}
-    entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
-    for part in ("title", "note"):
-        entry[part] = entry[part].format(**given)
-    entry["note"] += more
-    return Table(rows=rows, **parts_of(Table, entry | given))
+    entry = WORDS["tables"][key]
+    # A column is a heading, and where its cells come from entries their variable and form.
+    columns = [[each] if isinstance(each, str) else each for each in entry.get("columns", ())]
+    made = {
+        "name": key,
+        "title": entry["title"].format(**given),
+        "columns": tuple(head.format(**given) for head, *_ in columns),
+        "note": entry.get("note", "").format(**given) + more,
+    }
+    cells = [
+        tuple(cell(each, *how) for _, *how in columns) if isinstance(each, xr.Dataset) else each
+        for each in rows
+    ]
+    return Table(rows=cells, **parts_of(Table, entry | made | given))
 
 
 def parts_of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:
     """What of all that is given is a part of a dataclass."""
     return {each.name: given[each.name] for each in fields(kind) if each.name in given}
+
+
+def by_channel(channels: Iterable[str], columns: Iterable[Iterable[str]]) -> dict[str, Any]:
+    """Parts of a table with a row per channel, and one of averages where columns have it.
+
+    Columns start with their headings.
+
+    Examples
+    --------
+    >>> by_channel(["heave"], [["NRMSE", "0.1", "0.2"]])["rows"]
+    [('heave', '0.1'), ('average', '0.2')]
+    """
+    every, names = [[*column] for column in columns], ["channel", *channels]
+    averages = [len(names) - 1] if len(every[0]) > len(names) else []
+    heads, *rows = zip([*names, *["average"] * len(averages)], *every, strict=True)
+    return {"columns": heads, "rows": rows, "averages": averages}
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -135,21 +162,24 @@ def shade(text: str) -> int:
     return sum(value >= step for step in SHADES)
 
 
-def number(value: SupportsFloat, digits: int = 3) -> Number:
-    """Text of a number; a dash for NaN.
+def number(value: SupportsFloat, form: Form = 3) -> Number:
+    """Text of a number of so many decimals, or in another form; a dash for NaN.
 
     Examples
     --------
-    >>> number(-0.0004), number(-0.4), number(float("inf")), number(float("nan"))
-    ('0.000', '-0.400', 'inf', '–')
+    >>> number(0.12345), number(-0.0001), number(2255.3387, ".4g"), number(float("nan"))
+    ('0.123', '0.000', '2255', '–')
     """
+    if callable(form):
+        return form(value)
     value = float(value)
-    return MISSING if np.isnan(value) else Number(f"{value:z.{digits}f}")
+    spec = f"z.{form}f" if isinstance(form, int) else form
+    return MISSING if np.isnan(value) else Number(format(value, spec))
 
 
-def numbers(values: npt.ArrayLike, digits: int = 3) -> list[Number]:
+def numbers(values: npt.ArrayLike, form: Form = 3) -> list[Number]:
     """Texts of numbers, one after the other."""
-    return [number(each, digits) for each in np.ravel(values)]
+    return [number(each, form) for each in np.ravel(values)]
 
 
 def reach(values: npt.ArrayLike, digits: int = 0) -> str:
@@ -163,20 +193,8 @@ def reach(values: npt.ArrayLike, digits: int = 0) -> str:
     return " to ".join(dict.fromkeys(numbers([np.min(values), np.max(values)], digits)))
 
 
-def short(value: SupportsFloat, digits: int = 4) -> Number:
-    """Text of a number of four significant digits; a dash for NaN.
-
-    Examples
-    --------
-    >>> short(2255.3387), short(0.01), short(float("nan"))
-    ('2255', '0.01', '–')
-    """
-    value = float(value)
-    return MISSING if np.isnan(value) else Number(f"{value:.{digits}g}")
-
-
-shorter = partial(short, digits=3)
-"""Text of a number of three significant digits."""
+short, shorter = partial(number, form=".4g"), partial(number, form=".3g")
+"""Texts of numbers of four and of three significant digits."""
 
 
 def small_number(value: SupportsFloat) -> Number:
@@ -224,47 +242,68 @@ def probability(value: SupportsFloat) -> Number:
     return Number("< 0.001") if float(value) < 0.001 else number(value)
 
 
-def to(bounds: Iterable[SupportsFloat], form: Form = number) -> Number:
+def to(bounds: Iterable[SupportsFloat], form: Form = 3, unit: str = "") -> Number:
     """Text of an interval, or a dash.
 
     Examples
     --------
-    >>> to([0.421, 0.549]), to([2255.3, 3000.1], short), to([0.4, float("nan")])
-    ('0.421 to 0.549', '2255 to 3000', '–')
+    >>> to([0.421, 0.549]), to([2255.3, 3000.1], 0, " m"), to([0.4, float("nan")])
+    ('0.421 to 0.549', '2255 to 3000 m', '–')
     """
-    texts = [form(each) for each in bounds]
-    return MISSING if MISSING in texts else Number(" to ".join(texts))
+    texts = [number(each, form) for each in bounds]
+    return MISSING if MISSING in texts else Number(" to ".join(texts) + unit)
 
 
 def entries(data: xr.Dataset, *dims: str) -> Iterator[xr.Dataset]:
     """Entries of a dataset over some of its dimensions, the last of them first."""
-    for place in product(*(data[dim].values for dim in dims)):
-        yield data.sel(dict(zip(dims, place, strict=True)))
+    for place in np.ndindex(*(data.sizes[dim] for dim in dims)):
+        yield data.isel(dict(zip(dims, place, strict=True)))
 
 
-def row(at: xr.Dataset, /, *words: str, **forms: int | Form) -> tuple[str, ...]:
+def row(at: xr.Dataset, /, *words: str, **forms: Form) -> tuple[str, ...]:
     """Cells of an entry: its words, then its numbers, each with its decimals or form.
 
     Examples
     --------
     >>> at = xr.Dataset({"run": "first", "height": 0.0612, "mean": 1234.5})
-    >>> row(at, "run", height=2, mean=short)
+    >>> row(at, "run", height=2, mean=".4g")
     ('first', '0.06', '1234')
     """
-    texts = (str(at[key].values) for key in words)
-    numbers = (
-        number(at[key], form) if isinstance(form, int) else form(at[key])
-        for key, form in forms.items()
-    )
-    return (*texts, *numbers)
+    texts: dict[str, Form] = dict.fromkeys(words, "words")
+    return tuple(cell(at, key, form) for key, form in (texts | forms).items())
 
 
-def interval(at: xr.Dataset, key: str, form: Form = number) -> Number:
+def cell(at: xr.Dataset, key: str, form: Form = "words", *more: Form) -> str:
+    """Cell of an entry, in one of the forms of :data:`CELLS`, which `more` go to, or as a number.
+
+    Examples
+    --------
+    >>> at = xr.Dataset({"run": "first", "share": 0.123})
+    >>> cell(at, "run"), cell(at, "share", 2), cell(at, "share", "percent")
+    ('first', '0.12', '12 %')
+    """
+    return CELLS[form](at, key, *more) if form in CELLS else number(at[key], form)
+
+
+def interval(at: xr.Dataset, key: str, form: Form = 3) -> Number:
     """Text of the bounds ``KEY_lower`` and ``KEY_upper``."""
     return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")], form)
 
 
-def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) -> Number:
+CELLS: dict[Form, Callable[..., str]] = {
+    "words": lambda at, key: str(at[key].values),
+    "if there": lambda at, key, *how: cell(at, key, *how) if key in at else MISSING,
+    "model": lambda at, key: model_words(at[key].item()),
+    "percent": lambda at, key: to([100 * at[key]], 0, " %"),
+    "probability": lambda at, key: probability(at[key]),
+    "interval": interval,
+    "uncertain": lambda at, key: uncertain(at[key], at[f"{key}_uncertainty"]),
+    "growth": lambda at, _: ratio_of(at).growth(),
+}
+"""Forms of cells that are no format of a number, as ``words.toml`` names them."""
+
+
+def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = 3) -> Number:
     """Text of a number, and of others that belong to it, such as bounds, in brackets.
 
     Examples
@@ -272,7 +311,8 @@ def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) ->
     >>> beside(0.481, 0.421, 0.549), beside(-20.4, -35.0, 5.0, form=signed)
     ('0.481 [0.421, 0.549]', '-20 [-35, +5]')
     """
-    return Number(f"{form(value)} [{', '.join(map(form, others))}]")
+    first, *rest = (number(each, form) for each in (value, *others))
+    return Number(f"{first} [{', '.join(rest)}]")
 
 
 class Interval(NamedTuple):
@@ -282,21 +322,19 @@ class Interval(NamedTuple):
     lower: float
     upper: float
 
-    def below(self, bound: float) -> bool | None:
-        """Whether it lies below a bound; None where the interval holds the bound."""
-        return self.below_other(Interval(bound, bound, bound))
+    def below(self, other: Interval | float) -> bool | None:
+        """Whether it lies below a bound, or another number; None where the intervals meet."""
+        _, lower, upper = other if isinstance(other, Interval) else (other,) * 3
+        if self.upper < lower:
+            return True
+        return False if self.lower > upper else None
 
     def above(self, bound: float) -> bool | None:
         """Whether it lies above a bound; None where the interval holds the bound."""
-        return Interval(bound, bound, bound).below_other(self)
+        below = self.below(bound)
+        return None if below is None else not below
 
-    def below_other(self, other: Interval) -> bool | None:
-        """Whether it lies below another number; None where the intervals meet."""
-        if self.upper < other.lower:
-            return True
-        return False if self.lower > other.upper else None
-
-    def text(self, form: int | Form = 2, unit: str = "", factor: float = 1.0) -> Number:
+    def text(self, form: Form = 2, unit: str = "", factor: float = 1.0) -> Number:
         """Text of the number times a factor, with its interval in brackets.
 
         Examples
@@ -304,8 +342,7 @@ class Interval(NamedTuple):
         >>> Interval(0.4, 0.2, 0.6).text(), Interval(0.4, np.nan, np.nan).text(0, " %", 100)
         ('0.40 [0.20, 0.60]', '40 %')
         """
-        each = partial(number, digits=form) if isinstance(form, int) else form
-        value, low, high = (each(factor * x) for x in self)
+        value, low, high = numbers([factor * x for x in self], form)
         return Number(f"{value}{unit}" + f" [{low}, {high}]" * bool(np.isfinite(self.lower)))
 
     @property
@@ -326,10 +363,8 @@ class Interval(NamedTuple):
         words = {True: "better", False: "worse", None: "cannot tell"}[self.below(1.0)]
         if max(abs(self.lower - 1.0), abs(self.upper - 1.0)) < 0.005:
             words = "as good"
-        form, unit = (shorter, "times") if self.is_multiple else (_relative, "%")
-        texts = (to(ratios, form) for ratios in (self[:1], self[1:]))
-        value, bounds = (each if each == MISSING else Number(f"{each} {unit}") for each in texts)
-        return value, bounds, words
+        how = (shorter, " times") if self.is_multiple else (_relative, " %")
+        return to(self[:1], *how), to(self[1:], *how), words
 
     def change(self) -> Number:
         """Text of a ratio as a change.
@@ -515,44 +550,8 @@ def write_latex(table: Table, path: Path) -> Path:
         rf"p{{{width / LINE:.2f}\linewidth}}" if width < whole[k] else "lr"[k in table.numbers]
         for k, width in enumerate(widths(next(fitting, 8)))
     )
-    rows = [
-        "\\midrule\n" * (k in table.averages) + _latex_line(row) for k, row in enumerate(table.rows)
-    ]
-    text = (_LONG if len(table.rows) > PAGE else _SHORT).format(
-        name=table.name,
-        caption=latex_text(f"{table.title}. {table.note}".strip()),
-        form=form,
-        head=f"\\toprule\n{_latex_line(table.columns)}\n\\midrule",
-        body="\n".join(rows),
-    )
-    write_text(path, text)
+    environment = templates("report")
+    environment.filters["latex"] = latex_text
+    template = environment.get_template("table.tex")
+    write_text(path, template.render(table=table, form=form, long=len(table.rows) > PAGE))
     return path
-
-
-_SHORT = r"""\begin{{table}}
-\centering\small\tabcolsep=4pt
-\caption{{{caption}}}
-\label{{tab:{name}}}
-\begin{{tabular}}{{{form}}}
-{head}
-{body}
-\bottomrule
-\end{{tabular}}
-\end{{table}}
-"""
-_LONG = r"""\begingroup\small\tabcolsep=4pt
-\begin{{longtable}}{{{form}}}
-\caption{{{caption}}}\label{{tab:{name}}}\\
-{head}
-\endfirsthead
-{head}
-\endhead
-{body}
-\bottomrule
-\end{{longtable}}
-\endgroup
-"""
-
-
-def _latex_line(cells: Iterable[str]) -> str:
-    return " & ".join(map(latex_text, cells)) + r" \\"

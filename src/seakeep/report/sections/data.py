@@ -48,30 +48,32 @@ def wave_tables(result: StudyResult) -> list[Table]:
         return [positions]
     rows = []
     for at in entries(result.groups["runs"], "run"):
-        (name,), sea = row(at, "run"), at["sea_state"].item() or at["waves"].item()
         frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
         known = np.isfinite(frequency + depth)
         speed = phase_speed(2 * np.pi * frequency, depth) if known else np.nan
         # A sine has a height of 2√2 standard deviations, a sea one of 4.
         factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
-        height = number(factor * spectra["significant_height"].sel(run=name))
         spans = ", ".join(
             f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
             for use in ("train", "test")
             if np.isfinite(at[f"{use}_begin"])
         )
-        facts = (height, number(frequency), number(speed / frequency, 2), number(speed, 2))
-        rows.append((name, sea, *facts, spans or "test"))
+        facts = {
+            "sea_state": at["sea_state"].item() or at["waves"].item(),
+            "height": factor * spectra["significant_height"].sel(run=at["run"].item()),
+            "length": speed / frequency,
+            "speed": speed,
+            "used": spans or "test",
+        }
+        rows.append(at.assign(facts))
     return [table("waves", rows, **spectra.attrs), positions]
 
 
 def data(result: StudyResult) -> Section:
     """Return channels, and what preparation found in each run."""
     channels = result.groups["channels"]
-    signs, runs, clocks = [], [], []
-    for at in entries(channels, "name"):
-        words, use, unit, *others = row(at, "long_name", "use", "units", "positive", "source")
-        signs.append((words, use, shown_unit(unit), *others))
+    signs = channels.assign(units=("name", [*map(shown_unit, channels["units"].values)]))
+    runs, clocks = [], []
     for name, run in result.prepared.items():
         _, span, count, kinds = run_row(name, run)
         sea = row(result.groups["runs"].sel(run=name), "sea_state")
@@ -81,7 +83,7 @@ def data(result: StudyResult) -> Section:
     frame = channels.attrs.get("frame", "")
     return section(
         "data",
-        table("signs", signs, frame=frame and f"Frame: {frame}."),
+        table("signs", entries(signs, "name"), frame=frame and f"Frame: {frame}."),
         table("quality_of_runs", runs, name="runs"),
         table("clocks", clocks),
     )
@@ -329,8 +331,8 @@ def chosen(result: StudyResult) -> Section:
     """Return how settings that are not stated were chosen, and look-aheads."""
     rows = []
     for at in entries(result.groups["chosen"].sel(model=result.models), "model", "training"):
-        model, name, text = row(at, "model", "training", "words")
+        text = at["words"].item()
         if text or at["look_ahead"] > 0:
             words = "; ".join(map(str.strip, (text or "stated").splitlines()))
-            rows.append((model_words(model), name, *row(at, look_ahead=2), words))
+            rows.append(at.assign(words=words))
     return section("chosen", table("chosen", rows))

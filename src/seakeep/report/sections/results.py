@@ -3,7 +3,6 @@
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
-from functools import partial
 from itertools import chain
 from typing import Any
 
@@ -38,6 +37,7 @@ from seakeep.report.tables import (
     Table,
     band_verdict,
     beside,
+    by_channel,
     entries,
     number,
     numbers,
@@ -46,10 +46,10 @@ from seakeep.report.tables import (
     reach,
     row,
     short,
-    shorter,
     signed,
     small_number,
     table,
+    to,
 )
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -111,7 +111,7 @@ def _tested(result: StudyResult) -> str:
     )
 
 
-def by_channel(
+def _by_channel(
     result: StudyResult,
     key: str,
     columns: Iterable[Iterable[str]],
@@ -123,16 +123,16 @@ def by_channel(
 
     One of several test sets is named after it; that of the first is not folded away.
     """
-    names = ["channel", *map(result.words_of, result.channels), "average"]
-    heads, *rows = zip(names, *(map(Number, column) for column in columns), strict=True)
     if test:
         of_test = {"name": f"{key}_{test}", "folded": test != next(iter(result.tests))}
         given = {"test": result.label_of(test), **of_test, **given}
-    return table(key, rows, more, columns=heads, averages=[len(rows) - 1], **given)
+    names = map(result.words_of, result.channels)
+    shown = by_channel(names, (map(Number, column) for column in columns))
+    return table(key, more=more, **shown, **given)
 
 
 def _rows(result: StudyResult, statistic: str, **at: Any) -> xr.Dataset:
-    """A statistic over the rows of :func:`by_channel`."""
+    """A statistic over the rows of :func:`_by_channel`."""
     data = result.groups[f"statistics/{statistic}"]
     return data.sel(channel=[*result.channels, "average"], **at)
 
@@ -148,20 +148,19 @@ def _heat(result: StudyResult) -> Table:
         for test in result.tests
         for model in judged_models(result)
     ]
-    return by_channel(result, "heat", columns, of_judged(result))
+    return _by_channel(result, "heat", columns, of_judged(result))
 
 
 def overview_table(result: StudyResult) -> Table:
     """Both measures of each model in each test set, averages over the channels."""
     rows = []
-    boxes = result.groups["statistics/boxes"].sel(channel="average")
+    boxes = _labelled(result, result.groups["statistics/boxes"].sel(channel="average"))
     boxes["spread"] = boxes["upper_quartile"] - boxes["lower_quartile"]
     for at in entries(boxes, "test", "model"):
-        test, model = row(at, "test", "model")
         cells = [text for key in HEADING for text in row(at.sel(measure=key), median=3, spread=3)]
         cells += row(at.sel(measure="training_nrmse"), median=3)
         cells += row(at.sel(measure="nrmse"), count=0)
-        rows.append((result.label_of(test), model_words(model), *cells))
+        rows.append((*row(at, "test"), model_words(at["model"].item()), *cells))
     return table("overview", rows, conditional(result, result.models))
 
 
@@ -257,7 +256,7 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
             width, wider = row["relative_width"]
             calibrated = (
                 f" Calibrated on training data it holds {percent(held)} %, "
-                f"{short(wider, 2)} measured SD wide instead of {short(width, 2)}."
+                f"{number(wider, '.2g')} measured SD wide instead of {number(width, '.2g')}."
             )
         calibrated += infinite_bands(result, model)
     each = [test["lost"].sel(ensemble=model) for test in result.tests.values()]
@@ -394,7 +393,7 @@ def error_table(result: StudyResult, test: str) -> Table:
             "judged."
         )
     count = int(result.tests[test]["judged"].sum())
-    return by_channel(result, "errors", columns, more, test, count=count)
+    return _by_channel(result, "errors", columns, more, test, count=count)
 
 
 def scales(result: StudyResult) -> Section:
@@ -406,12 +405,12 @@ def _scales_table(result: StudyResult, test: str) -> Table:
     data = result.tests[test]
     spread = data["measured"].std("time", ddof=1) / data["training_std"]
     size = spread.where(data["judged"]).median(["training", "window"])
-    sizes = ["SD of the window [training SD]", *numbers(size.sel(channel=result.channels), 2), ""]
-    columns = []
+    sizes = numbers(size.sel(channel=result.channels), 2)
+    columns = [["SD of the window [training SD]", *sizes, ""]]
     for at in entries(_rows(result, "boxes", test=test), "model"):
         both = (numbers(at["median"].sel(measure=key)) for key in ("nrmse", "training_nrmse"))
         columns.append([model_words(at["model"].item()), *map("{} ({})".format, *both)])
-    return by_channel(result, "scales", [sizes, *columns], conditional(result, result.models), test)
+    return _by_channel(result, "scales", columns, conditional(result, result.models), test)
 
 
 def regular(result: StudyResult) -> Section:
@@ -426,9 +425,9 @@ def regular(result: StudyResult) -> Section:
         cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
             squares = [float(at[f"error_{key}"]) ** 2 for key in ("offset", "wave", "rest")]
-            total = sum(squares)
-            share = Number(f"{percent(squares[0] / total)} %") if total > 0 else MISSING
-            cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
+            share = 100 * squares[0] / total if (total := sum(squares)) else np.nan
+            cells += row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2)
+            cells.append(to([share], 0, " %"))
         rows.append(tuple(cells))
     runs = dict.fromkeys(run for test in tests for run in result.tests[test]["run"].values)
     slack = result.groups["runs"]["slack"].sel(run=list(runs), name=result.channels)
@@ -450,52 +449,44 @@ def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     if (groups := result.groups.get("statistics/bands")) is None:
         return section("bands")
-    units, tables = result.groups["channels"]["units"], []
-    level = short(100 * result.level)
+    tables, level = [], short(100 * result.level)
     for at in entries(groups.sel(model=result.ensembles), "model", "band"):
-        at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
         model, band = row(at, "model", "band")
         kind = "calibrated " * (band == "calibrated")
         title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
         more = (infinite_bands(result, model) if kind else "") + conditional(result, [model])
-        of_parts, of_channels = [], []
+        at = _labelled(result, at.sel(test=at["inside"].notnull().any(["part", "channel"])))
         scale = at["relative_width"] / at["width"]  # one over the measured SD
+        of_parts = []
         for one in entries(at.assign(at[["winkler", "crps"]] * scale), "test", "part"):
-            test, part = row(one, "test", "part")
             if one["inside"].notnull().any():
                 least = one["inside"][np.nanargmin(one["inside"].values)]
                 named = f"{number(least, 2)} ({result.words_of(least['channel'].item())})"
-                average = one.mean("channel")
-                held, *scores = row(average, inside=2, relative_width=2, winkler=2, crps=2)
-                of_parts.append((result.label_of(test), part, held, named, *scores))
-        for one in entries(at.sel(part="all"), "test", "channel"):
-            test, channel = row(one, "test", "channel")
-            named = f"{result.words_of(channel)} [{units.sel(name=channel).item()}]"
-            cells = row(one, inside=2, relative_width=2, winkler=shorter, crps=shorter)
-            of_channels.append((result.label_of(test), named, *cells))
-        for key, rows, name in (
-            ("bands", of_parts, f"bands_{band}_{model}"),
-            ("bands_by_channel", of_channels, f"bands_{band}_{model}_channels"),
-        ):
-            tables.append(table(key, rows, more, name=name, band=title))
+                of_parts.append(one.mean("channel").assign(least=named))
+        units = result.groups["channels"]["units"].sel(name=at["channel"].values)
+        labels = [f"{result.words_of(each['name'].item())} [{each.item()}]" for each in units]
+        of_channels = entries(at.assign_coords(channel=labels).sel(part="all"), "test", "channel")
+        name = f"bands_{band}_{model}"
+        tables += [
+            table("bands", of_parts, more, name=name, band=title),
+            table("bands_by_channel", of_channels, more, name=f"{name}_channels", band=title),
+        ]
     return section("bands", *tables)
+
+
+def _labelled(result: StudyResult, data: xr.Dataset) -> xr.Dataset:
+    """Statistics with the words for test sets in place of their names."""
+    return data.assign_coords(test=[*map(result.label_of, data["test"].values)])
 
 
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = result.settings["statistics"]["split_period"]
     trend = result.groups["statistics/trend"].sel(model=judged_models(result))
-    rows = [
-        (
-            result.label_of(at["test"].item()),
-            BAND_WORDS[at["band"].item()],
-            model_words(at["model"].item()),
-            number(at["error_mean"].mean()),
-            ratio_of(at).growth(),
-        )
-        for at in entries(trend, "test", "band", "model")
-    ]
+    trend = _labelled(result, trend.mean("time"))
+    trend["band"] = [BAND_WORDS[band] for band in trend["band"].values]
     seconds = split * result.encounter_period
+    rows = entries(trend, "test", "band", "model")
     return section(
         "time",
         drawing("error_over_time", error_over_time_figure, result, split=split),
@@ -505,34 +496,34 @@ def age(result: StudyResult) -> Section:
 
 def coverage(result: StudyResult) -> Section:
     """Return coverage and width of the bands of ensembles."""
-    kinds = (False, True) if result.is_calibrated else (False,)
-    return section(
-        "coverage", *(coverage_table(result, m, kind) for m in result.ensembles for kind in kinds)
+    tables = (
+        coverage_table(result, model, band)
+        for model in result.ensembles
+        for band in result.groups["statistics/coverage"]["band"].values
     )
+    return section("coverage", *tables)
 
 
-def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
-    """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
-    prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
+def coverage_table(result: StudyResult, model: str, band: str) -> Table:
+    """Coverage and width of a band, "members" or "calibrated", per test and channel."""
+    prefix = "calibrated_" * (band == "calibrated")
     shares = _rows(result, "coverage", model=model, band=band)
-    true, two = "truth" in shares["against"].values, partial(number, digits=2)
-    columns = []
-    for test in result.tests:
-        label, at = result.label_of(test), shares.sel(test=test)
-        inside = at["inside"].transpose("channel", "against")
-        parts = [beside(*each, form=two) if true else two(*each) for each in inside]
+    true, columns = "truth" in shares["against"].values, []
+    for at in entries(_labelled(result, shares), "test"):
+        (label,), inside = row(at, "test"), at["inside"].transpose("channel", "against")
+        parts = [beside(*each, form=2) if true else number(each[0], 2) for each in inside.values]
         columns.append([f"{label}: inside" + " [of the truth]" * true, *parts])
         widths = numbers(at["relative_width"].sel(against="measured"), 2)
         columns.append([f"{label}: width [SD]", *widths])
     level = result.level
-    more = _calibrated_words(result, model) if calibrated else ""
+    more = _calibrated_words(result, model) if prefix else ""
     if true:
         more += (
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
             "slap; rates are not filtered."
         )
     more += conditional(result, [model])
-    return by_channel(
+    return _by_channel(
         result,
         "coverage",
         columns,
@@ -616,7 +607,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     how = "blocks may cross joins, block length and bandwidth as printed in the paper"
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
-    return by_channel(
+    return _by_channel(
         result,
         "jsd",
         [*own, *published],
