@@ -50,13 +50,7 @@ from seakeep.models.training import TrainingArrays, TrainingData, departing
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
-PARTS: dict[str, Any] = {
-    "arrays": TrainingArrays,
-    "signature": Signature,
-    "coverage": Coverage,
-    "calibration": Calibration | None,
-    "selection": str,
-}
+KEPT = ("arrays", "signature", "coverage", "calibration", "selection")
 """What a file keeps beside the draws."""
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
@@ -806,7 +800,7 @@ class HankelEnsemble(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""
-        parts = store.pack({name: getattr(self, name) for name in PARTS})
+        parts = store.pack({name: getattr(self, name) for name in KEPT})
         return self.draws.assign(parts.data_vars).assign_attrs(parts.attrs)
 
 

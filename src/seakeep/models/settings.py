@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
+import xarray as xr
+
 from seakeep.arrays import (
     TINY,
     Datasets,
@@ -20,7 +22,7 @@ from seakeep.arrays import (
 )
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, quiet, warn
-from seakeep.models import labelled
+from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.following import BACK, Following
 from seakeep.models.inputs import InputMap
@@ -233,6 +235,8 @@ class HankelSettings:
     """
 
     kind: ClassVar[str]
+    model: ClassVar[type]
+    """What is fitted."""
     title: ClassVar[str] = ""
     role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = False
@@ -476,6 +480,12 @@ class HankelSettings:
         check_keys(cls, content)
         with quiet():  # given when the settings were made
             return cls(**content)
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> Any:
+        """Rebuild the model that a file holds; it is equal to the last bit."""
+        settings = cls.from_json(store.content(dataset, "settings"))
+        return store.restored(cls.model, dataset, settings=settings)
 
 
 def _written(value: Any) -> Any:

@@ -39,9 +39,20 @@ def pack(parts: Mapping[str, Any]) -> xr.Dataset:
     return xr.Dataset(variables, attrs=attrs)
 
 
-def unpack(dataset: xr.Dataset, **kinds: Any) -> dict[str, Any]:
-    """Rebuild parts of :func:`pack`, each of its kind: a dataclass, an array, or such and None."""
-    return {name: _rebuilt(kind, content(dataset, name), dataset) for name, kind in kinds.items()}
+def packed(model: Any) -> xr.Dataset:
+    """A fitted model as a Dataset: its settings as JSON, and its other fields."""
+    own = {each.name: getattr(model, each.name) for each in fields(model)}
+    return pack(own | {"settings": model.settings.to_json()})
+
+
+def restored(kind: Any, dataset: xr.Dataset, **given: Any) -> Any:
+    """Rebuild a dataclass of the fields that :func:`pack` wrote, and of those given here."""
+    kept = {
+        name: _rebuilt(hint, content(dataset, name), dataset)
+        for name, hint in _hints(kind).items()
+        if name in dataset.attrs and name not in given
+    }
+    return kind(**kept, **given)
 
 
 def _rebuilt(kind: Any, value: Any, dataset: xr.Dataset) -> Any:
