@@ -186,8 +186,11 @@ class LinearSpec(Plain):
         return replace(model, selection=chosen.describe())
 
     def solve(self, data: TrainingData) -> Solution:
-        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
-        raise NotImplementedError
+        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m).
+
+        By default the rows of the next states that these settings regress.
+        """
+        return data.regress(self)
 
 
 @dataclass(frozen=True)
@@ -225,10 +228,6 @@ class ARX(LinearSpec):
         """
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
         return cls(state_delays=s, input_delays=z, ridge="rollout", ridge_scale="per_snapshot")
-
-    def solve(self, data: TrainingData) -> Solution:
-        """Rows of the next states."""
-        return data.regress(self)
 
 
 @dataclass(frozen=True)
@@ -278,7 +277,7 @@ class FIR(LinearSpec):
 
     def solve(self, data: TrainingData) -> Solution:
         """Filters of the inputs, beside zeros for the states."""
-        system = data.regress(self)
+        system = super().solve(data)
         size = len(system.coefficients)
         return replace(
             system, coefficients=np.hstack([np.zeros((size, size)), system.coefficients])
