@@ -143,11 +143,6 @@ class HankelEnsemble(Model):
         """The members, and what they are centred on."""
         return self.members if self.centre is None else (*self.members, self.centre)
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the coefficients that :meth:`hold` keeps."""
-        return sum(member.coefficients.nbytes for member in self.identified)
-
     @cached_property
     def draws(self) -> xr.Dataset:
         """Drawn settings, over ``member``.
@@ -754,7 +749,7 @@ class HankelEnsemble(Model):
                 f"no member learnt from another run than '{run}', and none is left to forecast "
                 "it. Train on several runs, or calibrate on a run that does not train."
             )
-        arrays = self.arrays.without(left_out)
+        arrays = self.arrays.without(left_out, 0, len(self.arrays.states[left_out]), self.dt)
         return replace(self, members=members, arrays=arrays, calibration=None, identified=())
 
     def without_part(self, begin: int, end: int) -> HankelEnsemble:
@@ -775,7 +770,7 @@ class HankelEnsemble(Model):
         RequestError
             If no member is left.
         """
-        arrays = self.arrays.beside(begin, end, self.dt)
+        arrays = self.arrays.without(0, begin, end, self.dt)
         whole = self.arrays.offsets[0] + len(self.arrays.states[0])
         pieces = [
             (number, offset, offset + len(x))
