@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
 import xarray as xr
@@ -27,7 +27,6 @@ from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.following import BACK, Following
 from seakeep.models.inputs import InputMap
 from seakeep.models.observables import Observed, observables_of
-from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.models.terms import Observable
@@ -218,11 +217,6 @@ class Select:
         """Settings that are left open beside λ."""
         return tuple(name for name in OPENED if getattr(self, name))
 
-    @classmethod
-    def of(cls, value: object) -> Self | None:
-        """Return settings as they are, or made of a table of their keys; None stays None."""
-        return settings_of(cls, "select", value, "observables=True")
-
 
 @dataclass(frozen=True)
 class HankelSettings:
@@ -284,7 +278,9 @@ class HankelSettings:
             meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
             hint = f" True is {STABLE_RADIUS:g}."
             number(self.stable, "stable", meant, TINY, 1.0, hint)
-        object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
+        example = "mode='effective', surge='measured'"
+        aligned = settings_of(ProbeAlignment, "alignment", self.alignment, example)
+        object.__setattr__(self, "alignment", aligned)
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
         self._check_readouts()
@@ -468,11 +464,9 @@ class HankelSettings:
     def to_json(self) -> Json:
         """Settings as JSON values."""
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        maps = {
-            "observables": [observable_json(each) for each in self.observables],
-            "readouts": readouts_json(self.readouts),
-        }
-        return plain({key: maps.get(key, _written(each)) for key, each in content.items()})
+        if "readouts" in content:
+            content["readouts"] = readouts_json(self.readouts)
+        return plain({key: _written(each) for key, each in content.items()})
 
     @classmethod
     def from_json(cls, content: Json) -> Self:
@@ -489,9 +483,11 @@ class HankelSettings:
 
 
 def _written(value: Any) -> Any:
-    """A setting as its file states it: a length as text, and settings or a prior as a table."""
+    """A setting as its file states it: a length as text, and what has settings as a table."""
     if isinstance(value, Length):
         return str(value)
-    if isinstance(value, ProbeAlignment | Select):
-        return asdict(value)
-    return prior_json(value) if isinstance(value, Prior) else value
+    if isinstance(value, Prior):
+        return prior_json(value)
+    if isinstance(value, tuple):
+        return [_written(each) for each in value]
+    return store.table_of(value) if is_dataclass(value) else value

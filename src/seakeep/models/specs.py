@@ -11,7 +11,15 @@ from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, whole_number
+from seakeep.arrays import (
+    Datasets,
+    Json,
+    Progress,
+    check_choice,
+    check_flag,
+    settings_of,
+    whole_number,
+)
 from seakeep.errors import SHOWN, DataError, RequestError, quiet
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
@@ -73,7 +81,8 @@ class Choosing(HankelSettings, Generic[Fitted]):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "select", Select.of(self.select))
+        select = settings_of(Select, "select", self.select, "observables=True")
+        object.__setattr__(self, "select", select)
 
     @property
     def is_open(self) -> bool:

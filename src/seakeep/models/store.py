@@ -27,8 +27,7 @@ def pack(parts: Mapping[str, Any]) -> xr.Dataset:
             variables[path] = ([f"{path}_{axis}" for axis in range(value.ndim)], value)
             return path
         if is_dataclass(value):
-            own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
-            value = {"kind": value.kind, **own} if hasattr(value, "kind") else own
+            value = table_of(value)
         if isinstance(value, Mapping):
             return {str(key): described(each, f"{path}.{key}") for key, each in value.items()}
         if isinstance(value, list | tuple):
@@ -37,6 +36,12 @@ def pack(parts: Mapping[str, Any]) -> xr.Dataset:
 
     attrs = {name: json.dumps(described(part, name)) for name, part in parts.items()}
     return xr.Dataset(variables, attrs=attrs)
+
+
+def table_of(value: Any) -> dict[str, Any]:
+    """Fields of a dataclass by name, after its kind if it has one."""
+    own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
+    return {"kind": value.kind, **own} if hasattr(value, "kind") else own
 
 
 def packed(model: Any) -> xr.Dataset:
