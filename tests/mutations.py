@@ -202,7 +202,7 @@ CHANGES = {
     "core/rollout.py": [
         ("gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)", "gone = ~finite.all(axis=2)", "core/test_rollout.py::test_a_window_that_was_given_up_does_not_come_back"),
         ("moved[:, : size - N] += row[:, N:]", "moved[:, : size - N] += 0.0 * row[:, N:]", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
-        ("start = start[:, ::-1].reshape", "start = start.reshape", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
+        ("start = histories[:, ::-1].reshape", "start = histories.reshape", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
         ("states[:number] = _forced(rows, propagator.state_input)", "states[:number] = 0.5 * _forced(rows, propagator.state_input)", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
     ],
     "core/solve.py": [

@@ -182,6 +182,11 @@ class PrimalSystem:
     edges: FloatArray
     groups: tuple[Group, ...]
 
+    @property
+    def whole(self) -> FloatArray:
+        """Both triangles of C."""
+        return np.triu(self.gram) + np.triu(self.gram, 1).T
+
 
 def gram_trace(problem: Delayed) -> float:
     """Trace of the Gram matrix, which bounds the largest squared singular value from above."""

@@ -90,79 +90,7 @@ def rollout(
     >>> rollout([[0.5]], [[1.0]], [[1.0]], [[[0.0], [1.0], [0.0]]])[0, :, 0]
     array([0.5  , 1.25 , 0.625])
     """
-    return rollouts(A, B, [(histories, inputs, direct)], n_states=n_states)[0]
-
-
-Batch = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike | None]
-"""Histories, inputs and direct inputs of windows of one length."""
-
-
-def rollouts(
-    A: npt.ArrayLike, B: npt.ArrayLike, batches: Sequence[Batch], *, n_states: int | None = None
-) -> list[FloatArray]:
-    """Free runs of one model over batches of windows, each batch of a length of its own.
-
-    What makes several steps one product is prepared once for all batches.
-
-    Parameters
-    ----------
-    A, B, n_states
-        As for :func:`rollout`.
-    batches : sequence of (array_like, array_like, array_like or None)
-        Histories, inputs and direct inputs of each batch, as for :func:`rollout`; the last are
-        given in all batches or in none.
-
-    Returns
-    -------
-    list of ndarray, each of shape (window, steps, N)
-        One per batch.
-
-    Raises
-    ------
-    RequestError
-        If shapes do not fit together.
-    """
-    # A free run may overflow: it is cut off where it does.
-    a = np.atleast_2d(as_real(A, "A"))
-    b = as_real(B, "B")
-    read = [_read(a, b, *batch, n_states) for batch in batches]
-    matrices, count = read[0].matrices, read[0].count
-    channels = tuple(values.shape[2] for values in read[0].series)
-    windows, steps = sum(len(each.start) for each in read), max(each.steps for each in read)
-    out = [np.empty((0, each.steps, count)) for each in read]
-    if not windows:
-        return out
-    with undefined():
-        propagator = _propagator(a, matrices, count, channels, windows, steps)
-        for number, each in enumerate(read):
-            if len(each.start):
-                out[number] = _run(propagator, each.start, each.series, each.steps)
-                finite = np.isfinite(out[number])
-                if not finite.all():
-                    gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)
-                    out[number][gone] = np.nan
-    return out
-
-
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """A checked batch: extended histories, series of inputs and their columns of B̂, N."""
-
-    start: FloatArray
-    matrices: Arrays
-    series: Arrays
-    steps: int
-    count: int
-
-
-def _read(
-    a: FloatArray,
-    b: FloatArray,
-    histories: npt.ArrayLike,
-    inputs: npt.ArrayLike,
-    direct: npt.ArrayLike | None,
-    n_states: int | None,
-) -> _Read:
+    a, b = np.atleast_2d(as_real(A, "A")), as_real(B, "B")
     start, driving = as_real(histories, "histories"), as_real(inputs, "inputs")
     rows, size = a.shape
     count = n_states or (start.shape[2] if start.ndim == 3 else rows)
@@ -171,26 +99,64 @@ def _read(
             f"A of shape {a.shape} does not belong to {count} states: its columns must be a "
             "multiple of N, and its rows N or all of them."
         )
-    if start.ndim == 3:
-        start = start[:, ::-1].reshape(len(start), start.shape[1] * count)
-    if start.shape != (len(driving), size):
+    if (len(start), math.prod(start.shape[1:])) != (len(driving), size):
         raise RequestError(
-            f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
+            f"histories {start.shape} and inputs {driving.shape} do not fit A {a.shape}: "
             f"a history has {size} values, and both have one row per window."
         )
+    if start.ndim == 2:
+        start = start.reshape(len(start), size // count, count)[:, ::-1]
     beside = np.empty((0, 0, 0)) if direct is None else as_real(direct, "direct")
-    split = b.shape[1] - beside.shape[2]
-    steps = _steps(b[:, :split], driving)
-    matrices, series = [b[:, :split]], [driving]
-    if beside.shape[2]:
-        matrices.append(b[:, split:])
-        series.append(beside)
-        if beside.shape[:2] != (len(start), steps):
-            raise RequestError(
-                f"direct inputs of shape {beside.shape} do not stand beside {len(start)} window(s) "
-                f"of {steps} steps: one row per window and step is needed."
-            )
-    return _Read(start, tuple(matrices), tuple(series), steps, count)
+    steps = _steps(b[:, : b.shape[1] - beside.shape[2]], driving)
+    if not beside.shape[2]:
+        beside = np.empty((len(start), steps, 0))
+    elif beside.shape[:2] != (len(start), steps):
+        raise RequestError(
+            f"direct inputs of shape {beside.shape} do not stand beside {len(start)} window(s) "
+            f"of {steps} steps: one row per window and step is needed."
+        )
+    return (
+        rollouts(a, b, [(start, driving, beside)])[0] if len(start) else np.empty((0, steps, count))
+    )
+
+
+def rollouts(
+    a: FloatArray, b: FloatArray, batches: Sequence[tuple[FloatArray, FloatArray, FloatArray]]
+) -> list[FloatArray]:
+    """Free runs of one model over batches of windows, each batch of a length of its own.
+
+    What makes several steps one product is prepared once for all batches.
+
+    Parameters
+    ----------
+    a, b : ndarray
+        A and B of :func:`rollout`.
+    batches : sequence of (ndarray, ndarray, ndarray)
+        Histories and inputs of each batch as samples, oldest first, and direct inputs, shape
+        (window, steps, D), as for :func:`rollout`.
+
+    Returns
+    -------
+    list of ndarray, each of shape (window, steps, N)
+        One per batch.
+    """
+    count, D = batches[0][0].shape[2], batches[0][2].shape[2]
+    matrices = tuple(np.split(b, [b.shape[1] - D], axis=1))[: 1 + (D > 0)]
+    channels = tuple(series.shape[2] for series in batches[0][1:])[: len(matrices)]
+    windows = sum(len(direct) for *_, direct in batches)
+    longest = max(direct.shape[1] for *_, direct in batches)
+    out = []
+    with undefined():  # a free run may overflow: it is cut off where it does
+        propagator = _propagator(a, matrices, count, channels, windows, longest)
+        for histories, *series in batches:
+            start = histories[:, ::-1].reshape(len(histories), a.shape[1])
+            values = _run(propagator, start, tuple(series[: len(matrices)]), series[1].shape[1])
+            finite = np.isfinite(values)
+            if not finite.all():
+                gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)
+                values[gone] = np.nan
+            out.append(values)
+    return out
 
 
 def _steps(b: FloatArray, inputs: FloatArray) -> int:

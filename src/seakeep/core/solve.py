@@ -149,7 +149,7 @@ def identify(
     effective = ridge * problem.columns if per_snapshot else ridge
     chosen = "svd" if rank is not None else method or _choose(problem, effective, all_rows)
     if chosen == "svd":
-        solution = _by_singular_values(*_matrices(problem, all_rows), effective, rank)
+        solution = by_singular_values(*_matrices(problem, all_rows), effective, rank)
     else:
         form = _primal if chosen == "primal" else _dual
         count = min(problem.rows, problem.columns)
@@ -225,32 +225,25 @@ def _dual(problem: Delayed, ridge: float, all_rows: bool) -> FloatArray:
     return out
 
 
-def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:
-    """Ridge regression of plain matrices.
+def by_singular_values(
+    regressors: FloatArray, targets: FloatArray, ridge: float = 0.0, rank: int | None = None
+) -> Solution:
+    """Ridge regression of plain matrices, or least squares of least norm.
 
     Parameters
     ----------
     regressors, targets : ndarray, shapes (p, columns) and (q, columns)
         One column per observation.
-    ridge : float
+    ridge : float, optional
         λ, zero or positive. Zero gives the solution of least norm.
+    rank : int, optional
+        Number of singular values kept, instead of λ.
 
     Returns
     -------
     Solution
         Coefficients of shape (q, p).
     """
-    gram = regressors @ regressors.T
-    if ridge <= 0 or ridge < GRAM_LIMIT * np.trace(gram):
-        return _by_singular_values(regressors, targets, ridge, None)
-    factor = factorise(gram, ridge)
-    solved = solve_rows(factor, targets @ regressors.T)
-    return Solution(solved, "primal", ridge, min(regressors.shape))
-
-
-def _by_singular_values(
-    regressors: FloatArray, targets: FloatArray, ridge: float, rank: int | None
-) -> Solution:
     # A rank replaces λ.
     ridge = ridge if rank is None else 0.0
     left, values, right = linalg.svd(regressors, full_matrices=False, check_finite=False)

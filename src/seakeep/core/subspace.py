@@ -19,7 +19,7 @@ from seakeep.core.embedding import TrainingWindow
 from seakeep.core.gram import Delayed, lagged_response, primal_system, ridge_path
 from seakeep.core.response import clip_modes
 from seakeep.core.rollout import rollout
-from seakeep.core.solve import solve
+from seakeep.core.solve import by_singular_values
 from seakeep.errors import DataError
 
 
@@ -127,8 +127,7 @@ def identify_subspace(
     u, d = ([np.pad(each, ((1, 0), (0, 0))) for each in series] for series in (inputs, direct))
     ends = [TrainingWindow(w.first, w.last + 1, w.first_column + f) for w in windows]
     series = Delayed.of(y, [(y, f + s), (u, f + z - 1), (d, f - 1)], ends)
-    upper = primal_system(series).gram
-    gram = np.triu(upper) + np.triu(upper, 1).T
+    gram = primal_system(series).whole
     N, Q = y[0].shape[1], u[0].shape[1]
     stops = np.cumsum([N * f, N * (s + 1), Q * f, Q * z])
     targets, ys, us, earlier, ds = np.split(np.arange(len(gram)), stops)
@@ -155,7 +154,8 @@ def identify_subspace(
         drive = np.concatenate([u_run, d_run], axis=1)[w.first_column : w.last - 1].T
         now.append(np.concatenate([states[:, :-1], drive]))
         then.append(np.concatenate([states[:, 1:], x[w.first_column + 1 : w.last].T]))
-    both = solve(np.concatenate(now, axis=1), np.concatenate(then, axis=1), 0.0).coefficients
+    pairs = np.concatenate(now, axis=1), np.concatenate(then, axis=1)
+    both = by_singular_values(*pairs).coefficients
     (A, B), (C, D) = (np.split(rows, [order], axis=1) for rows in np.split(both, [order]))
     return StateSpace(clip_modes(A, 1.0)[0], B, C, D, estimator)
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -26,7 +26,6 @@ from seakeep.arrays import (
     check_flag,
     names_of,
     number,
-    settings_of,
 )
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
@@ -119,11 +118,6 @@ class ProbeAlignment:
             object.__setattr__(
                 self, "channels", names_of(self.channels, "alignment: channels", example)
             )
-
-    @classmethod
-    def of(cls, value: object) -> Self | None:
-        """Return settings as they are, or made of a table of their keys; None stays None."""
-        return settings_of(cls, "alignment", value, "mode='effective', surge='measured'")
 
     def fit(
         self,

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-import xarray as xr
 
 from seakeep.arrays import FloatArray, whole_number
 from seakeep.core.embedding import History
@@ -23,7 +22,7 @@ from seakeep.models.forecasts import Model, counted
 from seakeep.models.growth import LeadErrors, lead_errors, stretches_of, weighed_runs
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
-from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
 from seakeep.models.settings import (
@@ -33,7 +32,6 @@ from seakeep.models.settings import (
     Role,
     periods_to_samples,
 )
-from seakeep.models.store import unpack
 from seakeep.models.training import Training, TrainingData, gather, until
 from seakeep.models.validity import Coverage
 
@@ -64,7 +62,7 @@ class Plain(HankelSettings):
 
 
 @dataclass(frozen=True)
-class Constant(LinearKind, Plain):
+class Constant(Plain):
     """A model of nothing but the last state: its deviation from the mean, times a factor.
 
     Parameters
@@ -73,6 +71,7 @@ class Constant(LinearKind, Plain):
         Snapshots per run; None takes all up to ``stop``.
     """
 
+    model: ClassVar[type] = HankelDMDcModel
     factor: ClassVar[float]
     role: ClassVar[Role] = "reference"
     state_delays: int = _fixed(0)
@@ -141,9 +140,10 @@ class HoldLast(Constant):
 
 
 @dataclass(frozen=True)
-class LinearSpec(LinearKind, Plain):
+class LinearSpec(Plain):
     """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
 
+    model: ClassVar[type] = HankelDMDcModel
     may_choose: ClassVar[bool] = True
     opened: ClassVar[tuple[str, ...]] = ()
 
@@ -186,8 +186,11 @@ class LinearSpec(LinearKind, Plain):
         return replace(model, selection=chosen.describe())
 
     def solve(self, data: TrainingData) -> Solution:
-        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
-        raise NotImplementedError
+        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m).
+
+        By default the rows of the next states that these settings regress.
+        """
+        return data.regress(self)
 
 
 @dataclass(frozen=True)
@@ -225,10 +228,6 @@ class ARX(LinearSpec):
         """
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
         return cls(state_delays=s, input_delays=z, ridge="rollout", ridge_scale="per_snapshot")
-
-    def solve(self, data: TrainingData) -> Solution:
-        """Rows of the next states."""
-        return data.regress(self)
 
 
 @dataclass(frozen=True)
@@ -278,10 +277,71 @@ class FIR(LinearSpec):
 
     def solve(self, data: TrainingData) -> Solution:
         """Filters of the inputs, beside zeros for the states."""
-        system = data.regress(self)
+        system = super().solve(data)
         size = len(system.coefficients)
         return replace(
             system, coefficients=np.hstack([np.zeros((size, size)), system.coefficients])
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SubspaceModel(Model):
+    """Model fitted by :class:`Subspace`.
+
+    Parameters
+    ----------
+    settings : Subspace
+        The settings it was identified with.
+    training : Training
+        Runs and windows.
+    signature : Signature
+        Time step, names and units, delays, moments, and how inputs drive the model.
+    coverage : Coverage
+        Waves that it was trained in.
+    space : StateSpace
+        Matrices on standardised deviations, and the filter that finds the latent state.
+    errors : LeadErrors, optional
+        Its errors in training, which weigh forecasts from predicted waves.
+    """
+
+    settings: Subspace
+    training: Training
+    signature: Signature = field(repr=False)
+    coverage: Coverage = field(repr=False)
+    space: StateSpace = field(repr=False)
+    errors: LeadErrors | None = field(default=None, repr=False)
+
+    def free_runs(
+        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
+    ) -> list[FloatArray]:
+        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
+        return weighed_runs(self, self._runs, groups)
+
+    def _runs(self, groups: Sequence[Windows]) -> list[FloatArray]:
+        """The same, where no wave is predicted."""
+        runs = open_runs(
+            self.signature,
+            groups,
+            lambda batches: [self.space.free_runs(*each) for each in batches],
+        )
+        return [
+            (values if windows.zero is None else values + windows.zero[:, None])[None]
+            for values, windows in zip(runs, groups, strict=True)
+        ]
+
+    def system_matrices(self) -> Iterator[FloatArray]:
+        """A."""
+        yield self.space.A
+
+    def summary(self) -> str:
+        """Text that describes the model and its identification."""
+        radius = float(np.abs(np.linalg.eigvals(self.space.A)).max())
+        return "\n".join(
+            [
+                f"Subspace model (N4SID): {self.settings.order} latent states, dt {self.dt:g} s",
+                *self.lines(),
+                f"  stability     spectral radius {radius:.6f}",
+            ]
         )
 
 
@@ -308,6 +368,7 @@ class Subspace(Plain):
     """
 
     kind: ClassVar[str] = "subspace"
+    model: ClassVar[type] = SubspaceModel
     role: ClassVar[Role] = "reference"
     has_path: ClassVar[bool] = False
     ridge: float = 1e-3
@@ -376,77 +437,6 @@ class Subspace(Plain):
             stretches_of(data, signature, named),
         )
         return replace(model, errors=errors)
-
-    @classmethod
-    def restore(cls, dataset: xr.Dataset) -> SubspaceModel:
-        """Rebuild the model that a file holds."""
-        own = unpack(dataset, space=StateSpace, errors=LeadErrors | None)
-        return SubspaceModel(**own, **unpacked(dataset, cls))
-
-
-@dataclass(frozen=True, eq=False)
-class SubspaceModel(Model):
-    """Model fitted by :class:`Subspace`.
-
-    Parameters
-    ----------
-    settings : Subspace
-        The settings it was identified with.
-    space : StateSpace
-        Matrices on standardised deviations, and the filter that finds the latent state.
-    signature : Signature
-        Time step, names and units, delays, moments, and how inputs drive the model.
-    training : Training
-        Runs and windows.
-    coverage : Coverage
-        Waves that it was trained in.
-    errors : LeadErrors, optional
-        Its errors in training, which weigh forecasts from predicted waves.
-    """
-
-    settings: Subspace
-    space: StateSpace = field(repr=False)
-    signature: Signature = field(repr=False)
-    training: Training
-    coverage: Coverage = field(repr=False)
-    errors: LeadErrors | None = field(default=None, repr=False)
-
-    def free_runs(
-        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
-    ) -> list[FloatArray]:
-        """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        return weighed_runs(self, self._runs, groups)
-
-    def _runs(self, groups: Sequence[Windows]) -> list[FloatArray]:
-        """The same, where no wave is predicted."""
-        runs = open_runs(
-            self.signature,
-            groups,
-            lambda batches: [self.space.free_runs(*each) for each in batches],
-        )
-        return [
-            (values if windows.zero is None else values + windows.zero[:, None])[None]
-            for values, windows in zip(runs, groups, strict=True)
-        ]
-
-    def system_matrices(self) -> Iterator[FloatArray]:
-        """A."""
-        yield self.space.A
-
-    def summary(self) -> str:
-        """Text that describes the model and its identification."""
-        radius = float(np.abs(np.linalg.eigvals(self.space.A)).max())
-        return "\n".join(
-            [
-                f"Subspace model (N4SID): {self.settings.order} latent states, dt {self.dt:g} s",
-                *self.lines(),
-                f"  stability     spectral radius {radius:.6f}",
-            ]
-        )
-
-    def to_dataset(self) -> xr.Dataset:
-        """The model as a Dataset: what :meth:`save` writes."""
-        return packed(self, space=self.space, errors=self.errors)
 
 
 RIVALS = FIR(0), ARX(0, 0), Subspace(0, 0, 0.1)

@@ -50,13 +50,7 @@ from seakeep.models.training import TrainingArrays, TrainingData, departing
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
-PARTS: dict[str, Any] = {
-    "arrays": TrainingArrays,
-    "signature": Signature,
-    "coverage": Coverage,
-    "calibration": Calibration | None,
-    "selection": str,
-}
+KEPT = ("arrays", "signature", "coverage", "calibration", "selection")
 """What a file keeps beside the draws."""
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
@@ -148,11 +142,6 @@ class HankelEnsemble(Model):
     def _taught(self) -> tuple[Draw, ...]:
         """The members, and what they are centred on."""
         return self.members if self.centre is None else (*self.members, self.centre)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the coefficients that :meth:`hold` keeps."""
-        return sum(member.coefficients.nbytes for member in self.identified)
 
     @cached_property
     def draws(self) -> xr.Dataset:
@@ -760,7 +749,7 @@ class HankelEnsemble(Model):
                 f"no member learnt from another run than '{run}', and none is left to forecast "
                 "it. Train on several runs, or calibrate on a run that does not train."
             )
-        arrays = self.arrays.without(left_out)
+        arrays = self.arrays.without(left_out, 0, len(self.arrays.states[left_out]), self.dt)
         return replace(self, members=members, arrays=arrays, calibration=None, identified=())
 
     def without_part(self, begin: int, end: int) -> HankelEnsemble:
@@ -781,7 +770,7 @@ class HankelEnsemble(Model):
         RequestError
             If no member is left.
         """
-        arrays = self.arrays.beside(begin, end, self.dt)
+        arrays = self.arrays.without(0, begin, end, self.dt)
         whole = self.arrays.offsets[0] + len(self.arrays.states[0])
         pieces = [
             (number, offset, offset + len(x))
@@ -806,7 +795,7 @@ class HankelEnsemble(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""
-        parts = store.pack({name: getattr(self, name) for name in PARTS})
+        parts = store.pack({name: getattr(self, name) for name in KEPT})
         return self.draws.assign(parts.data_vars).assign_attrs(parts.attrs)
 
 

@@ -164,8 +164,8 @@ class Model:
         raise NotImplementedError
 
     def to_dataset(self) -> xr.Dataset:
-        """All that :meth:`save` writes."""
-        raise NotImplementedError
+        """The model as a Dataset: what :meth:`save` writes."""
+        return store.packed(self)
 
     def save(self, path: str | Path) -> Path:
         """Write the model as NetCDF, to a temporary name first.

@@ -41,17 +41,17 @@ class HankelDMDcModel(Model):
     ----------
     settings : Spec
         The settings it was identified with: those of a Hankel model or of a linear baseline.
-    coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
-        Regressed rows of [Â B̂], on standardised deviations.
-    signature : Signature
-        Time step, names and units, delays, moments, and how inputs drive the model.
     training : Training
         Runs, windows and form of the regression.
+    signature : Signature
+        Time step, names and units, delays, moments, and how inputs drive the model.
     coverage : Coverage
         Waves that it was trained in.
-    learnt : (TrainingData, runs), LeadErrors or HankelDMDcModel, optional
-        What it was fitted to, its errors there, or the varying model that it was taken from, whose
-        errors are its own. A member of an ensemble has none of them.
+    coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
+        Regressed rows of [Â B̂], on standardised deviations.
+    learnt : LeadErrors, (TrainingData, runs) or HankelDMDcModel, optional
+        Its errors in training, what it was fitted to, or the varying model that it was taken from,
+        whose errors are its own. A member of an ensemble has none of them.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     variation : Variation, optional
@@ -59,11 +59,11 @@ class HankelDMDcModel(Model):
     """
 
     settings: Any
-    coefficients: FloatArray = field(repr=False)
-    signature: Signature = field(repr=False)
     training: Training
+    signature: Signature = field(repr=False)
     coverage: Coverage = field(repr=False)
-    learnt: tuple[TrainingData, Datasets] | LeadErrors | HankelDMDcModel | None = field(
+    coefficients: FloatArray = field(repr=False)
+    learnt: LeadErrors | tuple[TrainingData, Datasets] | HankelDMDcModel | None = field(
         default=None, repr=False
     )
     selection: str = ""
@@ -591,44 +591,7 @@ class HankelDMDcModel(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
-        return packed(
-            self,
-            coefficients=self.coefficients,
-            learnt=self.errors,
-            selection=self.selection,
-            variation=self.variation,
-        )
-
-
-class LinearKind:
-    """A spec that fits a :class:`HankelDMDcModel`."""
-
-    @classmethod
-    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
-        """Rebuild the model that a file holds; it is equal to the last bit."""
-        spec: Any = cls
-        parts = store.unpack(
-            dataset,
-            coefficients=FloatArray,
-            learnt=LeadErrors | None,
-            selection=str,
-            variation=Variation | None,
-        )
-        return HankelDMDcModel(**parts, **unpacked(dataset, spec))
-
-
-def packed(model: Any, **parts: Any) -> xr.Dataset:
-    """What all single models keep in their files, and parts of this one; see :func:`unpacked`."""
-    common = {name: getattr(model, name) for name in ("training", "signature", "coverage")}
-    return store.pack({"settings": model.settings.to_json(), **common, **parts})
-
-
-def unpacked(dataset: xr.Dataset, spec: Any) -> dict[str, Any]:
-    """Settings, signature, training and coverage of a single model from its file."""
-    return {
-        "settings": spec.from_json(store.content(dataset, "settings")),
-        **store.unpack(dataset, training=Training, signature=Signature, coverage=Coverage),
-    }
+        return store.packed(replace(self, learnt=self.errors))
 
 
 def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:

@@ -6,7 +6,7 @@ one line in ``OBSERVABLES``.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -301,11 +301,6 @@ def named(observable: Observable) -> str:
     return f"{observable.kind} of {made_of}" if made_of else observable.kind
 
 
-def to_json(observable: Observable) -> dict[str, Any]:
-    """Kind and settings as JSON values."""
-    return {"kind": observable.kind, **asdict(observable)}  # type: ignore[call-overload]
-
-
 def from_json(table: Mapping[str, Any]) -> Observable:
     """Make an observable of its kind and settings, as a file or a TOML table states them.
 
@@ -406,14 +401,13 @@ class Observed:
         return BOUND * np.square(self.spreads) + TINY
 
     @cached_property
-    def groups(self) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:
+    def groups(self) -> tuple[tuple[Bound, ...], ...]:
         """The observables with the input delays, and those without."""
         pairs = [*zip(self.observables, self.bound, strict=True)]
-        delayed, direct = (
+        return tuple(
             tuple(bound for each, bound in pairs if each.delayed == wanted)
             for wanted in (True, False)
         )
-        return delayed, direct
 
     def reach(self, *, delayed: bool) -> tuple[int, int]:
         """Samples before and after an instant that rows with delays, or without, read."""
@@ -430,21 +424,19 @@ class Observed:
         return np.array([each.slope for each in self.groups[1] for _ in each.labels])
 
     @cached_property
-    def labels(self) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+    def labels(self) -> tuple[tuple[ChannelLabel, ...], ...]:
         """Labels of the columns with delays, and of those without."""
-        delayed, direct = (
+        return tuple(
             tuple(label for each in group for label in each.labels) for group in self.groups
         )
-        return delayed, direct
 
     @property
-    def stretch(self) -> tuple[FloatArray, FloatArray]:
+    def stretch(self) -> tuple[FloatArray, ...]:
         """Factors of the standard deviations of the columns with delays, and of those without."""
-        delayed, direct = (
+        return tuple(
             np.array([math.sqrt(each.stiffness) for each in group for _ in each.labels])
             for group in self.groups
         )
-        return delayed, direct
 
     def with_delayed(self, inputs: FloatArray) -> FloatArray:
         """Inputs, shape (time, Q), beside the columns that take the input delays."""

@@ -122,8 +122,7 @@ def regress_varying(
     right: Any = 0.0
     for run, (window, part) in enumerate(zip(data.windows, q, strict=True)):
         system, both = system_of([[x[run]] for x in series], [window], settings), [1.0, part]
-        own = np.triu(system.gram) + np.triu(system.gram, 1).T
-        gram = gram + np.kron(np.outer(both, both), own)
+        gram = gram + np.kron(np.outer(both, both), system.whole)
         right = right + np.kron(both, system.right)
     factor = counts.sum() if settings.ridge_scale == "per_snapshot" else 1.0
     ridge = factor * float(settings.ridge)

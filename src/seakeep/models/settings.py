@@ -3,8 +3,10 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal, Self, get_args
+
+import xarray as xr
 
 from seakeep.arrays import (
     TINY,
@@ -20,12 +22,11 @@ from seakeep.arrays import (
 )
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, quiet, warn
-from seakeep.models import labelled
+from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.following import BACK, Following
 from seakeep.models.inputs import InputMap
 from seakeep.models.observables import Observed, observables_of
-from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.models.terms import Observable
@@ -216,11 +217,6 @@ class Select:
         """Settings that are left open beside λ."""
         return tuple(name for name in OPENED if getattr(self, name))
 
-    @classmethod
-    def of(cls, value: object) -> Self | None:
-        """Return settings as they are, or made of a table of their keys; None stays None."""
-        return settings_of(cls, "select", value, "observables=True")
-
 
 @dataclass(frozen=True)
 class HankelSettings:
@@ -233,6 +229,8 @@ class HankelSettings:
     """
 
     kind: ClassVar[str]
+    model: ClassVar[type]
+    """What is fitted."""
     title: ClassVar[str] = ""
     role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = False
@@ -280,7 +278,9 @@ class HankelSettings:
             meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
             hint = f" True is {STABLE_RADIUS:g}."
             number(self.stable, "stable", meant, TINY, 1.0, hint)
-        object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
+        example = "mode='effective', surge='measured'"
+        aligned = settings_of(ProbeAlignment, "alignment", self.alignment, example)
+        object.__setattr__(self, "alignment", aligned)
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
         self._check_readouts()
@@ -464,11 +464,9 @@ class HankelSettings:
     def to_json(self) -> Json:
         """Settings as JSON values."""
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        maps = {
-            "observables": [observable_json(each) for each in self.observables],
-            "readouts": readouts_json(self.readouts),
-        }
-        return plain({key: maps.get(key, _written(each)) for key, each in content.items()})
+        if "readouts" in content:
+            content["readouts"] = readouts_json(self.readouts)
+        return plain({key: _written(each) for key, each in content.items()})
 
     @classmethod
     def from_json(cls, content: Json) -> Self:
@@ -477,11 +475,19 @@ class HankelSettings:
         with quiet():  # given when the settings were made
             return cls(**content)
 
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> Any:
+        """Rebuild the model that a file holds; it is equal to the last bit."""
+        settings = cls.from_json(store.content(dataset, "settings"))
+        return store.restored(cls.model, dataset, settings=settings)
+
 
 def _written(value: Any) -> Any:
-    """A setting as its file states it: a length as text, and settings or a prior as a table."""
+    """A setting as its file states it: a length as text, and what has settings as a table."""
     if isinstance(value, Length):
         return str(value)
-    if isinstance(value, ProbeAlignment | Select):
-        return asdict(value)
-    return prior_json(value) if isinstance(value, Prior) else value
+    if isinstance(value, Prior):
+        return prior_json(value)
+    if isinstance(value, tuple):
+        return [_written(each) for each in value]
+    return store.table_of(value) if is_dataclass(value) else value

@@ -11,7 +11,15 @@ from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, whole_number
+from seakeep.arrays import (
+    Datasets,
+    Json,
+    Progress,
+    check_choice,
+    check_flag,
+    settings_of,
+    whole_number,
+)
 from seakeep.errors import SHOWN, DataError, RequestError, quiet
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
@@ -19,11 +27,11 @@ from seakeep.models.baselines import FIR, Subspace
 from seakeep.models.candidates import MEMORY, default_observables
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
-from seakeep.models.ensemble import PARTS, HankelEnsemble, spectral_radius
+from seakeep.models.ensemble import HankelEnsemble, spectral_radius
 from seakeep.models.forecasts import Spec
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
-from seakeep.models.linear import HankelDMDcModel, LinearKind
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.parametric import regress_varying
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
@@ -73,7 +81,8 @@ class Choosing(HankelSettings, Generic[Fitted]):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "select", Select.of(self.select))
+        select = settings_of(Select, "select", self.select, "observables=True")
+        object.__setattr__(self, "select", select)
 
     @property
     def is_open(self) -> bool:
@@ -223,7 +232,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
 
 
 @dataclass(frozen=True)
-class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
+class HankelDMDc(Choosing[HankelDMDcModel]):
     r"""Settings of a Hankel dynamic mode decomposition with control.
 
     The model is :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with
@@ -318,6 +327,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
+    model: ClassVar[type] = HankelDMDcModel
     n_members: ClassVar[int] = 1
     parameter: str = ""
 
@@ -668,14 +678,15 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
     def restore(cls, dataset: xr.Dataset) -> HankelEnsemble:
         """Rebuild the ensemble that a file holds."""
         spec = cls.from_json(store.content(dataset, "ensemble"))
-        parts = store.unpack(dataset, **PARTS)
-        settings = spec.shared(dt := parts["signature"].dt)
-        return HankelEnsemble(
+        dt = store.content(dataset, "signature")["dt"]
+        settings = spec.shared(dt)
+        return store.restored(
+            HankelEnsemble,
+            dataset,
             settings=settings,
             origin=spec.to_json(),
             members=draws_of(dataset, settings),
             centre=spec.centred_on(dt),
-            **parts,
         )
 
     @classmethod

@@ -27,8 +27,7 @@ def pack(parts: Mapping[str, Any]) -> xr.Dataset:
             variables[path] = ([f"{path}_{axis}" for axis in range(value.ndim)], value)
             return path
         if is_dataclass(value):
-            own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
-            value = {"kind": value.kind, **own} if hasattr(value, "kind") else own
+            value = table_of(value)
         if isinstance(value, Mapping):
             return {str(key): described(each, f"{path}.{key}") for key, each in value.items()}
         if isinstance(value, list | tuple):
@@ -39,9 +38,26 @@ def pack(parts: Mapping[str, Any]) -> xr.Dataset:
     return xr.Dataset(variables, attrs=attrs)
 
 
-def unpack(dataset: xr.Dataset, **kinds: Any) -> dict[str, Any]:
-    """Rebuild parts of :func:`pack`, each of its kind: a dataclass, an array, or such and None."""
-    return {name: _rebuilt(kind, content(dataset, name), dataset) for name, kind in kinds.items()}
+def table_of(value: Any) -> dict[str, Any]:
+    """Fields of a dataclass by name, after its kind if it has one."""
+    own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
+    return {"kind": value.kind, **own} if hasattr(value, "kind") else own
+
+
+def packed(model: Any) -> xr.Dataset:
+    """A fitted model as a Dataset: its settings as JSON, and its other fields."""
+    own = {each.name: getattr(model, each.name) for each in fields(model)}
+    return pack(own | {"settings": model.settings.to_json()})
+
+
+def restored(kind: Any, dataset: xr.Dataset, **given: Any) -> Any:
+    """Rebuild a dataclass of the fields that :func:`pack` wrote, and of those given here."""
+    kept = {
+        name: _rebuilt(hint, content(dataset, name), dataset)
+        for name, hint in _hints(kind).items()
+        if name in dataset.attrs and name not in given
+    }
+    return kind(**kept, **given)
 
 
 def _rebuilt(kind: Any, value: Any, dataset: xr.Dataset) -> Any:

@@ -371,17 +371,11 @@ class TrainingArrays:
             read.append((name, x, u, v, first, float(time[min(first, end - 1)])))
         return cls(*zip(*read, strict=True))
 
-    def without(self, run: int) -> Self:
-        """Those of the other runs."""
-        parts = (getattr(self, each.name) for each in fields(self))
-        return type(self)(*(part[:run] + part[run + 1 :] for part in parts))
-
-    def beside(self, begin: int, end: int, dt: float) -> Self:
-        """What lies before and after some samples of a single run, each as a run of its own."""
-        (name,), (states,), (delayed,), (direct,), (offset,), (start,) = (
-            getattr(self, each.name) for each in fields(self)
-        )
-        read = [
+    def without(self, run: int, begin: int, end: int, dt: float) -> Self:
+        """All but some samples of a run; what lies before and after these are two runs."""
+        read = [*zip(*(getattr(self, each.name) for each in fields(self)), strict=True)]
+        name, states, delayed, direct, offset, start = read[run]
+        read[run : run + 1] = [
             (name, states[cut], delayed[cut], direct[cut], offset + at, start + at * dt)
             for cut, at in ((slice(0, begin), 0), (slice(end, None), end))
             if len(states[cut])
