@@ -90,6 +90,8 @@ def test_a_derivative_of_another_sign_or_scale_than_its_motion(order, suffix):
         return [each.value for each in derivatives(Record("r", run))]
 
     assert gains(1.0) == gains(0.6) == gains(1.8) == []
+    sway = record(DT, {}, sway=x.at(T), sway_acceleration=changed.at(T) * -1.0)
+    assert not [*derivatives(Record("r", sway))]  # gravity may turn it over
     for factor in (-1.0, -57.3, 57.3):
         assert gains(factor) == [pytest.approx(factor, rel=0.1)]  # noise of 0.3 SD lowers it
 
@@ -144,6 +146,15 @@ def test_waves_that_none_of_their_period_is(height, slower, stated, told):
     found = [*waves_of(Record("r", run, stated_period=stated))]
     assert [each.kind.name for each in found] == told
     assert not [*waves_of(Record("r", run, stated_period=stated, waves="still"))]
+
+
+@pytest.mark.parametrize(("level", "told"), [(0.12, False), (0.14, True), (-18.5, True)])
+def test_a_gauge_that_counts_from_elsewhere_than_still_water(level, told):
+    """Waves of 0.13 m."""
+    run = record(DT, eta_fwd=level + 0.13 / 8**0.5 * np.sin(tau * T / PERIOD))
+    run["eta_fwd"].attrs["units"] = "m"
+    values = [each.value for each in waves_of(Record("r", run))]
+    assert values == [pytest.approx(level, rel=1e-3)] * told  # waves in parts at the end
 
 
 def test_channels_that_hold_no_wave_are_left():

@@ -46,6 +46,12 @@ class SamplesKind(Kind):
     DRIFT = "level drifts by {value:+.3g} over the record"
     IMPOSSIBLE = "reaches {value:.3g}, more than {limit:.3g}", _UNIT
     OUT_OF_WATER = "leaves its mean by {value:.3g} in water of {limit:g}", _UNIT
+    STILL_WATER = (
+        "has its mean {value:+.3g} from zero, farther than its waves are high ({limit:.3g})",
+        "Elevations count upwards from still water: state sign = -1 in [channels.{channel}] if the "
+        "gauge measures the distance down to the water, and its offset.",
+        True,
+    )
     WAVES = (
         "shows waves of {value:.3g} and {period:.3g} s: no sea and no basin has them (heights are "
         "1/20 000 to 1/7 of the length in deep water)",
@@ -176,6 +182,8 @@ def waves(record: Record) -> Findings:
         height, length = 4 * float(x.std()), GRAVITY * period**2 / (2 * np.pi)
         if record.water_depth and height > record.water_depth:  # which `impossible` reports
             continue
+        if abs(mean := float(x.mean())) > height:
+            yield record.finding(SamplesKind.STILL_WATER, name, mean, height, "m")
         if not FLATTEST < height / length < STEEPEST:
             yield record.finding(SamplesKind.WAVES, name, height, unit="m", period=period)
         elif record.stated_period and not 1 / 3 < record.stated_period / period < 3:

@@ -148,7 +148,7 @@ def derivatives(record: Record) -> Findings:
     frequency = np.fft.rfftfreq(count, dt)
     for motion, (order, (suffix, words)) in product(MOTIONS, enumerate(DERIVED, start=1)):
         name = motion + suffix
-        if not {motion, name} <= {*run.data_vars}:
+        if name in TILTED or not {motion, name} <= {*run.data_vars}:
             continue
         x, derivative = filled(run[motion]), filled(run[name])
         period = dominant_period(derivative, dt)
@@ -197,6 +197,9 @@ def positions(record: Record) -> Findings:
 
 DERIVED = ("_rate", ""), ("_acceleration", "second ")
 """Suffixes of the derivatives of a motion, and their order in words."""
+
+TILTED = ("surge_acceleration", "sway_acceleration")
+"""Accelerations that tilt changes: accelerometers feel gravity too."""
 
 LEAST_CORRELATION = 0.8
 """At a lower correlation no lag and no scale is given: 36 % of the variance would be the sensor's
