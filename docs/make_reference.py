@@ -171,7 +171,7 @@ def shown(field):
 def rows(table):
     """Rows of the keys of a table."""
     for name, field in table.model_fields.items():
-        words = (field.description or "").replace("|", "\\|")
+        words = " ".join((field.description or "").split()).replace("|", "\\|")
         yield f"| `{field.alias or name}` | {shown(field)} | {words} |"
 
 

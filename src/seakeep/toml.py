@@ -1,7 +1,7 @@
 """Reader of TOML files (campaign, study, tank), with one set of messages for mistakes.
 
-Pydantic tables derived from :class:`Table` describe a file. The description of a field
-is the remedy in a message. Lengths in encounter periods are :class:`Length`.
+Pydantic tables derived from :class:`Table` describe a file. The description of a field, which is
+the text below it, is the remedy in a message. Lengths in encounter periods are :class:`Length`.
 """
 
 import math
@@ -161,7 +161,13 @@ Span = Annotated[tuple[_Edge, _Edge], Listed, AfterValidator(_rising)]
 class Table(BaseModel):
     """A frozen table that refuses keys it does not know."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        populate_by_name=True,
+        use_attribute_docstrings=True,
+    )
     others: ClassVar[type[BaseModel] | None] = None
     """What a key is whose name the user chooses, where fixed keys stand beside such keys."""
 
@@ -367,7 +373,8 @@ def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel], str,
         owner = here
         fields = {field.alias or name: field for name, field in owner.model_fields.items()}
         if key in fields:
-            here, description = _within(fields[key].annotation), fields[key].description or ""
+            here, words = _within(fields[key].annotation), fields[key].description or ""
+            description = " ".join(words.split())
         elif (here := getattr(owner, "others", None)) is None:
             return owner, "", depth + 1
     return owner, description, len(loc)
