@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -196,7 +196,6 @@ class InstrumentsSettings(Table):
     """``[instruments]``: whose clock is time, and a table for each logger."""
 
     model_config = ConfigDict(extra="allow")
-    others: ClassVar = InstrumentSettings
     __pydantic_extra__: dict[str, InstrumentSettings] = Field(init=False)
 
     reference: str | None = None
