@@ -14,7 +14,12 @@ from pathlib import Path
 import typer
 from pydantic_core import PydanticUndefined
 
-from seakeep.campaign.settings import CampaignSettings, ModelSettings
+from seakeep.campaign.settings import (
+    CampaignSettings,
+    InstrumentSettings,
+    InstrumentsSettings,
+    ModelSettings,
+)
 from seakeep.cli import app
 from seakeep.models import BayesianHankelDMDc, HankelDMDc, ProbeAlignment, Select
 from seakeep.study.settings import StudySettings
@@ -171,7 +176,7 @@ def shown(field):
 def rows(table):
     """Rows of the keys of a table."""
     for name, field in table.model_fields.items():
-        words = (field.description or "").replace("|", "\\|")
+        words = " ".join((field.description or "").split()).replace("|", "\\|")
         yield f"| `{field.alias or name}` | {shown(field)} | {words} |"
 
 
@@ -215,8 +220,8 @@ def keys_of(settings):
         for spec, words in OF_MODELS.items() if table is ModelSettings else ():
             lines += [f"Keys of {words}:", ""]
             lines += ["| key | default | meaning |", "|---|---|---|", *documented(spec), ""]
-        if table.others is not None:
-            queue.insert(0, table.others)
+        if table is InstrumentsSettings:
+            queue.insert(0, InstrumentSettings)
         for field in table.model_fields.values():
             queue += tables_of(field.annotation)
     return lines

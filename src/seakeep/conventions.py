@@ -207,10 +207,7 @@ percent = 0.01 = pct
 def _registry() -> Any:
     import pint  # here, because it takes a tenth of a second that not every command needs
 
-    registry: Any = pint.UnitRegistry(None)
-    for line in _UNITS.strip().splitlines():
-        registry.define(line)
-    return registry
+    return pint.UnitRegistry(_UNITS.strip().splitlines())
 
 
 _RAISED = str.maketrans("⁻¹²³⁴", "-1234")
@@ -273,10 +270,10 @@ def si_unit(unit: str) -> str:
     >>> si_unit("deg/s"), si_unit("kN"), si_unit("-")
     ('rad/s', 'N', '1')
     """
-    base = _registry().get_base_units(_parsed(unit))[1]
-    for name in ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "N", "N*m", "Pa", "W", "Hz", "V"):
-        if _registry().get_base_units(_parsed(name))[1] == base:
-            return "N m" if name == "N*m" else name
+    known = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "N", "N m", "Pa", "W", "Hz", "V")
+    base, *bases = (_registry().get_base_units(_parsed(each))[1] for each in (unit, *known))
+    if base in bases:
+        return known[bases.index(base)]
     return f"{base:~C}".replace("**", "^").replace("*", " ") or "1"
 
 

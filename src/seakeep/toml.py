@@ -1,18 +1,17 @@
 """Reader of TOML files (campaign, study, tank), with one set of messages for mistakes.
 
-Pydantic tables derived from :class:`Table` describe a file. The description of a field
-is the remedy in a message. Lengths in encounter periods are :class:`Length`.
+Pydantic tables derived from :class:`Table` describe a file. The description of a field, which is
+the text below it, is the remedy in a message. Lengths in encounter periods are :class:`Length`.
 """
 
 import math
 import re
 import tomllib
-import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -20,11 +19,14 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     PlainSerializer,
     PlainValidator,
     Tag,
     ValidationError,
+    model_validator,
 )
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from seakeep.errors import SHOWN, MissingFileError, RequestError, did_you_mean, wanted
 from seakeep.files import read_bytes, templates
@@ -159,11 +161,40 @@ Span = Annotated[tuple[_Edge, _Edge], Listed, AfterValidator(_rising)]
 
 
 class Table(BaseModel):
-    """A frozen table that refuses keys it does not know."""
+    """A frozen table that refuses keys it does not know, and says in our words what it refuses."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, populate_by_name=True)
-    others: ClassVar[type[BaseModel] | None] = None
-    """What a key is whose name the user chooses, where fixed keys stand beside such keys."""
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        populate_by_name=True,
+        use_attribute_docstrings=True,
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _worded(cls, received: object, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(received, dict):  # refused, and worded by the table around it
+            return handler(received)
+        try:
+            return handler(received)
+        except ValidationError as error:
+            refused = [_mistake(item, cls) for item in error.errors(include_url=False)]
+        raise ValidationError.from_exception_data(
+            cls.__name__,
+            [
+                InitErrorDetails(
+                    type=PydanticCustomError(_MISTAKE, "{words}", {"words": words}),
+                    loc=place,
+                    input=None,
+                )
+                for place, words in refused
+            ],
+        )
+
+
+_MISTAKE = "mistake"
+"""Kind of the errors of pydantic that hold our words."""
 
 
 def optional(description: str, default: Any = None) -> Any:
@@ -279,13 +310,7 @@ def validated(
     try:
         settings = root.model_validate(received)
     except ValidationError as error:
-        refused = []
-        for item in error.errors(include_url=False):
-            # Pydantic's own words: '[key]' of a table, '<number>' for a branch of a union.
-            place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
-            table, description, depth = _place(place, root)
-            key = tuple(part for part in place[:depth] if part != "[key]")
-            refused.append((key, _reason(item, place, table, description)))
+        refused = [_mistake(item, root) for item in error.errors(include_url=False)]
         raise refusal(source, what, refused) from None
     if also and (mistakes := list(also(settings))):
         raise refusal(source, what, mistakes)
@@ -325,22 +350,31 @@ def _parts(dotted: str) -> tuple[str, ...]:
     return tuple("".join(match) for match in _PART.findall(dotted))
 
 
-def _reason(item: Any, place: list[str], table: type[BaseModel], description: str) -> str:
-    kind, value = item["type"], item["input"]
+def _mistake(item: Any, table: type[BaseModel]) -> Mistake:
+    """Place and words of an error of pydantic in a table."""
+    kind, value, place = item["type"], item["input"], item["loc"]
+    if kind == _MISTAKE:  # of a table within it
+        return tuple(map(str, place)), item["msg"]
+    fields = {field.alias or name: field for name, field in table.model_fields.items()}
+    field = fields.get(place[0] if place else "", Field())
+    description = " ".join((field.description or "").split())
+    # What follows is the place within a value, but for the keys of a dict.
+    key = place[: 1 + (get_origin(field.annotation) is dict)]
     give = f" Give {description}." if description else ""
     if kind == "extra_forbidden":
-        known = [field.alias or name for name, field in table.model_fields.items()]
-        near, keys = did_you_mean(place[-1], known), ", ".join(known)
-        return f"unknown key, received {_shown(value)}.{near} Keys here: {keys}."
-    if (kind == "missing" and place[-1].isdigit()) or kind == "too_long":
-        return f"received {_shown(value)}, a list of the wrong length ({len(value)}).{give}"
-    if kind == "too_short":
-        return f"received {_shown(value)}, which is empty.{give}"
-    if kind == "missing":
-        return f"missing. Add it: {description}." if description else "missing. Add it."
-    if kind == "value_error":
-        return f"{item['ctx']['error']}; received {_shown(value)}."
-    return f"received {_shown(value)}, which {wanted(str(item['msg']))}.{give}"
+        near, keys = did_you_mean(key[-1], fields), ", ".join(fields)
+        words = f"unknown key, received {_shown(value)}.{near} Keys here: {keys}."
+    elif (kind == "missing" and len(place) > 1) or kind == "too_long":
+        words = f"received {_shown(value)}, a list of the wrong length ({len(value)}).{give}"
+    elif kind == "too_short":
+        words = f"received {_shown(value)}, which is empty.{give}"
+    elif kind == "missing":
+        words = f"missing. Add it: {description}." if description else "missing. Add it."
+    elif kind == "value_error":
+        words = f"{item['ctx']['error']}; received {_shown(value)}."
+    else:
+        words = f"received {_shown(value)}, which {wanted(str(item['msg']))}.{give}"
+    return tuple(key), words
 
 
 def _shown(value: object) -> str:
@@ -352,30 +386,3 @@ def _shown(value: object) -> str:
     else:
         text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
-
-
-def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel], str, int]:
-    """Table in which the last key stands, that key's description, and how many keys count."""
-    here: Any = root
-    owner, description = root, ""
-    for depth, key in enumerate(loc):
-        if here is None:
-            return owner, description, depth
-        if typing.get_origin(here) is dict:
-            here = _within(typing.get_args(here)[1])
-            continue
-        owner = here
-        fields = {field.alias or name: field for name, field in owner.model_fields.items()}
-        if key in fields:
-            here, description = _within(fields[key].annotation), fields[key].description or ""
-        elif (here := getattr(owner, "others", None)) is None:
-            return owner, "", depth + 1
-    return owner, description, len(loc)
-
-
-def _within(annotation: Any) -> Any:
-    """Return the table or the dict that an annotation allows, behind unions and annotations."""
-    if typing.get_origin(annotation) is dict or hasattr(annotation, "model_fields"):
-        return annotation
-    inner = map(_within, typing.get_args(annotation))
-    return next((each for each in inner if each is not None), None)

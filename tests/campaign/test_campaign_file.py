@@ -168,6 +168,12 @@ MISTAKES = [
         '[runs.second.channels.heave]\nunit = "rad"\n[preparation]',
         "runs.second.channels.heave.unit: the unit 'rad' does not fit heave",
     ),
+    (
+        "[preparation]",
+        "[runs]\nthird = 3\n[preparation]",
+        "runs.third: received 3, which should be a dictionary or instance of RunSettings. Give at "
+        "least one table [runs.NAME] with a file.",
+    ),
 ]
 
 

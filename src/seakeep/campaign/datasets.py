@@ -66,16 +66,15 @@ def state_of(dataset: PublicDataset, folder: Path | None) -> str:
     """Say how much of a data set is in a folder, by checksum: complete, absent, or how many."""
     if not folder:
         return "unknown: SEAKEEP_DATA_DIR is not set"
-    places = [(folder / dataset.name / name, wanted) for name, wanted in dataset.files.items()]
-    there = [(place, wanted) for place, wanted in places if place.is_file()]
-    right = sum(sha256_of(place) == wanted for place, wanted in there)
-    if right == len(places):
-        return "complete"
-    if not there:
+    places = {folder / dataset.name / name: wanted for name, wanted in dataset.files.items()}
+    right = [sha256_of(place) == places[place] for place in places if place.is_file()]
+    if not right:
         return "absent"
+    if len(right) == len(places) and all(right):
+        return "complete"
     return (
-        f"{right} of {len(places)} files as published, {len(places) - len(there)} missing, "
-        f"{len(there) - right} altered"
+        f"{right.count(True)} of {len(places)} files as published, {len(places) - len(right)} "
+        f"missing, {right.count(False)} altered"
     )
 
 

@@ -1,10 +1,10 @@
 """Guesses about columns, files and runs of a campaign, from names, units and waves."""
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, product
+from itertools import chain, combinations, product
 from pathlib import Path
 from typing import Literal
 
@@ -58,13 +58,21 @@ HYSTERESIS = 0.3
 
 @dataclass(frozen=True, eq=False)
 class File:
-    """A file of a run: of which run and which logger; its columns, and that which is time."""
+    """A file of a run: its columns, that which is time, and of which run and which logger it is."""
 
     path: Path
-    run: str
-    logger: str
     table: Columns
     time: str
+    run: str = ""
+    logger: str = ""
+
+    def is_like(self, other: "File") -> bool:
+        """Whether it has columns of the same names, as other files of its logger have."""
+        own, others = (
+            {n for n in each.table.names if n != each.time and not is_trigger(n)}
+            for each in (self, other)
+        )
+        return len(own & others) >= 0.5 * min(len(own), len(others))
 
     @property
     def rate(self) -> float | None:
@@ -229,22 +237,18 @@ def _by_folder(path: Path) -> tuple[str, str]:
     return folder, _stem(path).removeprefix(folder).strip("_+-") or _stem(path)
 
 
-def _by_name(paths: Sequence[Path], own: Sequence[set[str]]) -> list[tuple[str, str]]:
+def _by_name(files: Files) -> list[tuple[str, str]]:
     """Run and logger, where files of like columns end on the same words."""
-    stems = [re.split(r"[_-]+", _stem(path)) for path in paths]
+    stems = [re.split(r"[_-]+", _stem(file.path)) for file in files]
     keys = []
-    for words, columns in zip(stems, own, strict=True):
-        alike = [s for s, other in zip(stems, own, strict=True) if _alike(columns, other)]
+    for file, words in zip(files, stems, strict=True):
+        alike = [s for s, other in zip(stems, files, strict=True) if file.is_like(other)]
         count = 0
         while count < len(words) and len({tuple(s[-count - 1 :]) for s in alike}) == 1:
             count += 1
         at = len(words) - (count if len(alike) > 1 else 1)
         keys.append(("_".join(words[:at]), "_".join(words[at:])))
     return keys
-
-
-def _alike(one: set[str], other: set[str]) -> bool:
-    return len(one & other) >= 0.5 * min(len(one), len(other))
 
 
 def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
@@ -254,40 +258,35 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
     logger the same: ``RUN/LOGGER.csv`` or ``RUN_LOGGER.csv``. Otherwise each file is a run, called
     as its folder where the files are called alike.
     """
-    # By its name; else by its values, where no file states its rate.
-    times = [
-        time_column(table) or ("" if table.sampling_rate else _rising_column(table))
-        for table in tables
-    ]
-    own = [
-        {n for n in table.names if n != time and not is_trigger(n)}
-        for table, time in zip(tables, times, strict=True)
+    # Times by their name; else by their values, where the file does not state its rate.
+    files = [
+        File(path, table, time_column(table) or ("" if table.sampling_rate else _rising(table)))
+        for path, table in zip(paths, tables, strict=True)
     ]
     folders = [_by_folder(path) for path in paths]
-    for keys in (folders, _by_name(paths, own)):
-        if _fits(keys, own):
-            break
-    else:
-        stems, above = [_stem(path) for path in paths], [folder for folder, _ in folders]
-        if len(set(stems)) == 1 < len(set(above)):
-            stems = above
-        taken: Counter[str] = Counter()
-        keys = [(_free(stem, taken), "") for stem in stems]
-    return [
-        File(*each) for each in zip(paths, *zip(*keys, strict=True), tables, times, strict=True)
-    ]
+    for keys in (folders, _by_name(files)):
+        placed = [
+            replace(file, run=run, logger=logger)
+            for file, (run, logger) in zip(files, keys, strict=True)
+        ]
+        if _fits(placed):
+            return placed
+    stems, above = [_stem(path) for path in paths], [folder for folder, _ in folders]
+    if len(set(stems)) == 1 < len(set(above)):
+        stems = above
+    taken: Counter[str] = Counter()
+    return [replace(f, run=_free(stem, taken)) for f, stem in zip(files, stems, strict=True)]
 
 
-def _fits(keys: Sequence[tuple[str, str]], own: Sequence[set[str]]) -> bool:
-    runs, loggers = {run for run, _ in keys}, {logger for _, logger in keys}
-    if len(set(keys)) < len(keys) or len(runs) == len(keys) or "" in runs | loggers:
+def _fits(files: Files) -> bool:
+    """Whether no files of one run have like columns, and all files of one logger have."""
+    runs, loggers = {file.run for file in files}, {file.logger for file in files}
+    if len(runs) == len(files) or "" in runs | loggers:
         return False
-    for i, (run, logger) in enumerate(keys):
-        for j, (other, same) in enumerate(keys[:i]):
-            alike = _alike(own[i], own[j])
-            if (run == other and alike) or (logger == same and not alike):
-                return False
-    return True
+    return not any(
+        one.run == other.run if one.is_like(other) else one.logger == other.logger
+        for one, other in combinations(files, 2)
+    )
 
 
 def _free(stem: str, taken: Counter[str]) -> str:
@@ -312,15 +311,15 @@ def guess_channels(files: Files) -> list[Guess]:
                 name = guess.channel and _free(guess.channel, taken)
                 out.append(replace(guess, channel=name))
     # Motions and waves beside which others of their unit move far more.
-    sizes = {}
+    sizes, largest = {}, defaultdict[tuple[str, bool], float](float)
     for guess in out:
         if guess.is_motion or is_elevation(guess.channel):
             series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
             spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
             unit = si_unit(guess.unit)
-            size = max(map(np.ptp, spans)) * conversion(guess.unit, unit)
-            sizes[guess.channel] = (unit, guess.is_motion), size
-    largest = {kind: max(x for k, x in sizes.values() if k == kind) for kind, _ in sizes.values()}
+            kind, size = (unit, guess.is_motion), max(map(np.ptp, spans))
+            sizes[guess.channel] = kind, size * conversion(guess.unit, unit)
+            largest[kind] = max(largest[kind], sizes[guess.channel][1])
     rests = {name for name, (kind, size) in sizes.items() if size <= AT_REST * largest[kind]}
     return [replace(each, at_rest=each.channel in rests) for each in out]
 
@@ -383,7 +382,7 @@ def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]
     return "", "" if not lengths else "short" if max(lengths) <= SHORT_GAP else "long"
 
 
-def _rising_column(table: Columns) -> str:
+def _rising(table: Columns) -> str:
     """Name of the first column that rises and has a word for times in its name, such as "t_DAQ".
 
     Without any it is the first that rises evenly, unless it counts 1, 2, 3; empty if there is none.

@@ -266,47 +266,42 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
         The channels wanted, with what they need; the default is all.
     """
     needed = needed_channels(run.settings, wanted)
-    chosen = {name: each for name, each in run.channels.items() if name in needed}
-    groups = {
-        key: _channels(run, run.loggers[key], own)
-        for key, own in _by_logger(run, chosen).items()
-        if own
-    }
+    held: dict[str, ChannelMap] = {key: {} for key in run.loggers}
+    for name, each in run.channels.items():
+        if name in needed:
+            held[_holder(run, name, each)][name] = each
+    groups = {key: _channels(run, run.loggers[key], own) for key, own in held.items() if own}
     ahead = [name for name in needed if name in run.settings.derived]
     return replace(run, groups=groups, ahead=ahead)
 
 
-def _by_logger(run: Run, channels: ChannelMap) -> dict[str, ChannelMap]:
-    """Channels that each logger holds."""
-    if len(run.loggers) == 1:
-        return dict.fromkeys(run.loggers, channels)
-    held: dict[str, ChannelMap] = {key: {} for key in run.loggers}
-    for name, each in channels.items():
-        if each.instrument is not None:
-            if each.instrument not in run.loggers:
-                near = did_you_mean(each.instrument, run.loggers)
-                raise RequestError(
-                    f"channels.{name}.instrument: run '{run.name}' has no file of "
-                    f"'{each.instrument}'.{near} Its files: {', '.join(run.loggers)}."
-                )
-            held[each.instrument][name] = each
-            continue
-        column, tables = each.column or name, [one.columns for one in run.loggers.values()]
-        having = [key for key, one in run.loggers.items() if one.columns.find(column) is not None]
-        if not having:
-            listed = ", ".join(dict.fromkeys(c for table in tables for c in table.names))
+def _holder(run: Run, name: str, own: ChannelSettings) -> str:
+    """Logger in whose file a channel stands."""
+    stated, column = own.instrument, own.column or name
+    tables = {key: each.columns for key, each in run.loggers.items()}
+    having = [key for key, table in tables.items() if table.find(column) is not None]
+    if len(tables) == 1:
+        having = list(tables)
+    elif stated is not None:
+        if stated not in tables:
             raise RequestError(
-                f"run '{run.name}': none of its {len(tables)} files has a column '{column}' for "
-                f"channel '{name}'.{meant_column(column, tables)} Correct [channels.{name}]. "
-                f"Their columns: {listed}."
+                f"channels.{name}.instrument: run '{run.name}' has no file of "
+                f"'{stated}'.{did_you_mean(stated, tables)} Its files: {', '.join(tables)}."
             )
-        if len(having) > 1:
-            raise RequestError(
-                f"run '{run.name}': the column '{column}' of channel '{name}' stands in the files "
-                f"of {' and '.join(having)}. State instrument = '{having[0]}' in [channels.{name}]."
-            )
-        held[having[0]][name] = each
-    return held
+        having = [stated]
+    if not having:
+        listed = ", ".join(dict.fromkeys(c for table in tables.values() for c in table.names))
+        meant = meant_column(column, tables.values())
+        raise RequestError(
+            f"run '{run.name}': none of its {len(tables)} files has a column '{column}' for "
+            f"channel '{name}'.{meant} Correct [channels.{name}]. Their columns: {listed}."
+        )
+    if len(having) > 1:
+        raise RequestError(
+            f"run '{run.name}': the column '{column}' of channel '{name}' stands in the files "
+            f"of {' and '.join(having)}. State instrument = '{having[0]}' in [channels.{name}]."
+        )
+    return having[0]
 
 
 def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
@@ -414,17 +409,14 @@ def _regular(
             raise DataError(f"{error} Or state {mend} in [preparation].") from None
     series = np.column_stack([each.values for each in data.values()])
     new, values = onto_uniform(time, series, name)
-    read = np.full_like(values, np.nan)
-    read[report.place] = series
+    read = data.assign_coords(time=data["time"].copy(data=new[report.place])).reindex(time=new)
     done = {
         "time_gaps": len(report.gaps),
         "time_missing": report.missing,
         "time_jitter_rms": report.jitter_rms if report.jittered else 0.0,
     }
-    names = [str(name) for name in data]
-    variables = {n: ("time", x, data[n].attrs) for n, x in zip(names, values.T, strict=True)}
-    uniform = xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
-    return uniform, dict(zip(names, read.T, strict=True))
+    uniform = read.copy(data=dict(zip(data, values.T, strict=True))).assign_attrs(done)
+    return uniform, {str(n): each.values for n, each in read.items()}
 
 
 def flag_samples(
@@ -626,12 +618,12 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
         Runs left out of what is pooled, and why.
     """
     settings, preparation = run.settings, run.settings.preparation
-    rates = {}
-    for name in run.groups:
-        own = settings.instruments[name] if name else settings.files
-        if own.sampling_rate:
-            is_guess = own.time is None and own.sampling_rate_assumed
-            rates[name] = Rate(own.sampling_rate, is_guess)
+    times = {name: settings.instruments[name] if name else settings.files for name in run.groups}
+    rates = {
+        name: Rate(own.sampling_rate, own.time is None and own.sampling_rate_assumed)
+        for name, own in times.items()
+        if own.sampling_rate
+    }
     channels = run.channels
     units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
     waves = {

@@ -14,9 +14,9 @@ from seakeep.campaign.live_chain import LiveChain
 from seakeep.campaign.pipeline import Run, celerity_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
-from seakeep.campaign.survey import Failures, Survey, spare, survey
+from seakeep.campaign.survey import Failures, Survey, survey
 from seakeep.campaign.validation import cross_checks, span_mistakes
-from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
+from seakeep.errors import DataError, MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import digest_of, expanded, version
 from seakeep.quality import as_json, judge_runs, warn_of
 from seakeep.signals import Clock, uniform_step
@@ -225,14 +225,10 @@ class Campaign:
         """
         wanted = list(self.runs if names is None else names)
         surveyed = self._survey(wanted, False)
-        return {name: dict(surveyed.clocks[name]) for name in wanted}
+        return {name: dict(surveyed.clocks_of(name)) for name in wanted}
 
     def _survey(
-        self,
-        wanted: list[str],
-        needs_period: bool,
-        progress: Progress | None = None,
-        failures: Failures | None = None,
+        self, wanted: list[str], needs_period: bool, progress: Progress | None = None
     ) -> Survey:
         """Clocks of the wanted runs, and the encounter period if needed."""
         for name in wanted:
@@ -244,7 +240,7 @@ class Campaign:
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
-        surveyed = survey(self.settings, self.files_of, wanted, channel, progress, failures)
+        surveyed = survey(self.settings, self.files_of, wanted, channel, progress)
         if surveyed.period:
             for place, words in span_mistakes(self.settings, surveyed.period):
                 raise RequestError(f"{'.'.join(place)}: {words}")
@@ -378,13 +374,11 @@ class Campaign:
             As :meth:`prepare`.
         """
         wanted = list(self.runs if names is None else names)
-        surveyed = self._survey(wanted, self._measures_period, progress, failures)
+        surveyed = self._survey(wanted, self._measures_period, progress)
         dt, first = surveyed.dt, ""
         reported = {(str(self.settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
-                if failures and name in failures:
-                    raise failures[name]
                 run = surveyed.channels(name)
                 own = uniform_step(run.reference_time, f"run '{name}'")
                 dt, first = dt or own, first or name
@@ -403,7 +397,10 @@ class Campaign:
                 data.attrs.update(self._attributes(run, dt))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
-                spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
+                failure = error if is_named else type(error)(f"run '{name}': {error}")
+                if failures is None or not isinstance(error, DataError | MissingFileError):
+                    raise failure from None
+                failures[name] = failure
                 if progress:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue

@@ -1,14 +1,14 @@
 """Tables of a campaign file: one frozen table per section, validated by pydantic.
 
 Nothing is read from disk here; :mod:`seakeep.campaign.validation` fills these tables from TOML and
-turns what does not fit into messages. A field's description is the remedy that a message proposes.
+turns what does not fit into messages. The text below a field is the remedy that a message proposes.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -26,7 +26,6 @@ from seakeep.toml import (
     Positive,
     Span,
     Table,
-    optional,
     packaged,
     parse_length,
 )
@@ -35,47 +34,46 @@ from seakeep.toml import (
 class GeneralSettings(Table):
     """``[campaign]``: what the campaign is called, its scale and its encounter period."""
 
-    name: str = optional("a name for titles and tables", "")
-    description: str = optional("free text", "")
-    scale_factor: Positive = optional("full-scale length over model length, such as 30.0", 1.0)
-    encounter_period: Positive | None = optional(
-        "mean encounter period in seconds; left out, it is measured, in test runs too"
-    )
-    period_channel: str | None = optional(
-        "the wave channel whose zero-up-crossings define the encounter period"
-    )
-    period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = optional(
-        "fraction of its standard deviation by which a wave must pass its mean either way to "
-        "count; 0, the paper's, counts all. Still water around the waves never counts",
-        0.0,
-    )
+    name: str = ""
+    """a name for titles and tables"""
+    description: str = ""
+    """free text"""
+    scale_factor: Positive = 1.0
+    """full-scale length over model length, such as 30.0"""
+    encounter_period: Positive | None = None
+    """mean encounter period in seconds; left out, it is measured, in test runs too"""
+    period_channel: str | None = None
+    """the wave channel whose zero-up-crossings define the encounter period"""
+    period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """fraction of its standard deviation by which a wave must pass its mean either way to count; 0,
+    the paper's, counts all. Still water around the waves never counts"""
 
 
 class RigSettings(Table):
     """``[rig]``: the basin and where things stand in it."""
 
-    water_depth: Annotated[float, AfterValidator(_depth)] | None = optional(
-        "water depth in metres; inf, without quotes, for deep water; left out at forward speed, "
-        "where linear dispersion does not hold"
-    )
-    wave_direction: Finite | None = optional(
-        "direction in which the waves run, degrees from the x axis"
-    )
-    frame: str | None = optional("words that describe the frame")
-    positions: dict[str, Finite] = optional("channel = x position in metres, along the waves", {})
+    water_depth: Annotated[float, AfterValidator(_depth)] | None = None
+    """water depth in metres; inf, without quotes, for deep water; left out at forward speed, where
+    linear dispersion does not hold"""
+    wave_direction: Finite | None = None
+    """direction in which the waves run, degrees from the x axis"""
+    frame: str | None = None
+    """words that describe the frame"""
+    positions: dict[str, Finite] = Field(default={})
+    """channel = x position in metres, along the waves"""
 
 
 class TimesSettings(Table):
     """What a file's times are, in ``[files]`` and ``[instruments.NAME]``."""
 
-    time: str | None = optional("the name of the time column")
-    time_unit: str | None = optional("unit of the time column, such as 'ms'")
-    sampling_rate: Positive | None = optional(
-        "samples per second, for files that have no time column"
-    )
-    sampling_rate_assumed: bool = optional(
-        "true while sampling_rate is a guess: prepare warns until it is removed", False
-    )
+    time: str | None = None
+    """the name of the time column"""
+    time_unit: str | None = None
+    """unit of the time column, such as 'ms'"""
+    sampling_rate: Positive | None = None
+    """samples per second, for files that have no time column"""
+    sampling_rate_assumed: bool = False
+    """true while sampling_rate is a guess: prepare warns until it is removed"""
 
 
 class FileSettings(Options, TimesSettings):
@@ -89,18 +87,22 @@ class ChannelSettings(Table):
     to the reading, in the file's unit, before the sign.
     """
 
-    column: str | None = optional("the column in the file; left out, the channel's own name")
-    instrument: str | None = optional("whose file holds it, where several files have such a column")
-    unit: str | None = optional("unit of the column, such as 'mm'; left out, the file's header")
-    unit_assumed: bool = optional(
-        "true while unit is a guess: prepare warns until it is removed", False
-    )
-    sign: Literal[1, -1] = optional("1 or -1", 1)
-    offset: Finite = optional("added to the reading, in the file's unit, before the sign", 0.0)
-    accuracy: NotNegative | None = optional(
-        "standard uncertainty of the instrument, in the file's unit (type B)"
-    )
-    long_name: str | None = optional("name for labels")
+    column: str | None = None
+    """the column in the file; left out, the channel's own name"""
+    instrument: str | None = None
+    """whose file holds it, where several files have such a column"""
+    unit: str | None = None
+    """unit of the column, such as 'mm'; left out, the file's header"""
+    unit_assumed: bool = False
+    """true while unit is a guess: prepare warns until it is removed"""
+    sign: Literal[1, -1] = 1
+    """1 or -1"""
+    offset: Finite = 0.0
+    """added to the reading, in the file's unit, before the sign"""
+    accuracy: NotNegative | None = None
+    """standard uncertainty of the instrument, in the file's unit (type B)"""
+    long_name: str | None = None
+    """name for labels"""
 
 
 def _rising_band(band: tuple[float, float]) -> tuple[float, float]:
@@ -158,24 +160,29 @@ class InstrumentSettings(TimesSettings):
     `drift` as stated, or the reference's own clock.
     """
 
-    trigger: str | None = optional("the column that holds the trigger")
-    trigger_unit: str | None = optional("unit of the trigger, for the eye")
-    shared: TwoColumns | None = optional(
-        "[own column, reference's column] of one signal both record"
-    )
-    correlated: TwoColumns | None = optional(
-        "[own column, reference's column] of signals that go together"
-    )
-    window: Duration = optional("length of correlation windows, s or periods", 20.0)
-    largest_lag: Duration = optional("lags searched on either side, s or periods", 5.0)
-    offset: Finite | None = optional(
-        "reading of its clock at reference time 0, s; beside trigger, shared or correlated, near "
-        "which it is searched"
-    )
-    drift: Finite | None = optional("drift of its clock, ppm")
-    metres_per_pixel: Positive | None = optional("of a camera, in the vessel's plane")
-    panel: Pair | None = optional("[length, height] of the panel that a camera tracks, m")
-    panel_height: Finite | None = optional("of the panel's centre above the centre of gravity, m")
+    trigger: str | None = None
+    """the column that holds the trigger"""
+    trigger_unit: str | None = None
+    """unit of the trigger, for the eye"""
+    shared: TwoColumns | None = None
+    """[own column, reference's column] of one signal both record"""
+    correlated: TwoColumns | None = None
+    """[own column, reference's column] of signals that go together"""
+    window: Duration = 20.0
+    """length of correlation windows, s or periods"""
+    largest_lag: Duration = 5.0
+    """lags searched on either side, s or periods"""
+    offset: Finite | None = None
+    """reading of its clock at reference time 0, s; beside trigger, shared or correlated, near which
+    it is searched"""
+    drift: Finite | None = None
+    """drift of its clock, ppm"""
+    metres_per_pixel: Positive | None = None
+    """of a camera, in the vessel's plane"""
+    panel: Pair | None = None
+    """[length, height] of the panel that a camera tracks, m"""
+    panel_height: Finite | None = None
+    """of the panel's centre above the centre of gravity, m"""
 
     @model_validator(mode="after")
     def _one_way(self) -> InstrumentSettings:
@@ -189,13 +196,12 @@ class InstrumentsSettings(Table):
     """``[instruments]``: whose clock is time, and a table for each logger."""
 
     model_config = ConfigDict(extra="allow")
-    others: ClassVar = InstrumentSettings
     __pydantic_extra__: dict[str, InstrumentSettings] = Field(init=False)
 
-    reference: str | None = optional(
-        "the logger whose clock is the time of all; the first by default"
-    )
-    pool_drift: bool = optional("true: one drift per logger for all runs that agree", True)
+    reference: str | None = None
+    """the logger whose clock is the time of all; the first by default"""
+    pool_drift: bool = True
+    """true: one drift per logger for all runs that agree"""
 
     @property
     def loggers(self) -> dict[str, InstrumentSettings]:
@@ -218,51 +224,47 @@ Step = Literal[
 class DerivedSettings(Table):
     """``[derived.NAME]``: a channel made from others, by an expression or by a named step."""
 
-    expression: str | None = optional(
-        "such as '0.5*(acc_sb + acc_ps)', of channels in SI units and radians, whatever the "
-        "units of their columns; knows + - * / **, square, abs, sqrt, sin, cos, mean (over "
-        "time) and average (of several channels)"
-    )
-    source: str | None = Field(
-        default=None, alias="from", description="the channel that the step works on"
-    )
-    step: Step | None = optional("what to do with the channel named by 'from'")
-    times: Literal[1, 2] | None = optional("integrate once or twice")
-    band: Band | None = optional("[low, high] in Hz, kept by 'integrate' and 'band_pass'")
-    passband: Positive | None = optional("edge of the pass band, Hz")
-    stopband: Positive | None = optional("edge of the stop band, Hz")
-    position: str | None = optional(
-        "'complementary_filter': the measured position that gives the slow part"
-    )
-    crossover: Positive | None = optional(
-        "'complementary_filter': where both count half, below the waves, Hz"
-    )
-    offset: Vector | None = optional(
-        "'transfer': [x, y, z] from the measured to the wanted point, m, in the body's "
-        "axes (x downstream, z up)"
-    )
-    axis: Literal["x", "y", "z"] | None = optional(
-        "direction of a channel that is not called surge, sway or heave"
-    )
-    components: Annotated[tuple[str, str, str], Listed] | None = optional(
-        "'remove_gravity': accelerometers along x, y and z of the body"
-    )
-    zeroed: bool | None = optional(
-        "'remove_gravity': true where readings were set to zero at rest, false where "
-        "the one along z reads +9.81 m/s^2 there"
-    )
-    unit: str | None = optional(
-        "unit of the number that the expression gives, so of angles 'rad'; needed for free "
-        "names; the channel itself is in SI units"
-    )
-    long_name: str | None = optional("name for labels")
+    expression: str | None = None
+    """such as '0.5*(acc_sb + acc_ps)', of channels in SI units and radians, whatever the units of
+    their columns; knows + - * / **, square, abs, sqrt, sin, cos, mean (over time) and average (of
+    several channels)"""
+    source: str | None = Field(default=None, alias="from")
+    """the channel that the step works on"""
+    step: Step | None = None
+    """what to do with the channel named by 'from'"""
+    times: Literal[1, 2] | None = None
+    """integrate once or twice"""
+    band: Band | None = None
+    """[low, high] in Hz, kept by 'integrate' and 'band_pass'"""
+    passband: Positive | None = None
+    """edge of the pass band, Hz"""
+    stopband: Positive | None = None
+    """edge of the stop band, Hz"""
+    position: str | None = None
+    """'complementary_filter': the measured position that gives the slow part"""
+    crossover: Positive | None = None
+    """'complementary_filter': where both count half, below the waves, Hz"""
+    offset: Vector | None = None
+    """'transfer': [x, y, z] from the measured to the wanted point, m, in the body's axes (x
+    downstream, z up)"""
+    axis: Literal["x", "y", "z"] | None = None
+    """direction of a channel that is not called surge, sway or heave"""
+    components: Annotated[tuple[str, str, str], Listed] | None = None
+    """'remove_gravity': accelerometers along x, y and z of the body"""
+    zeroed: bool | None = None
+    """'remove_gravity': true where readings were set to zero at rest, false where the one along z
+    reads +9.81 m/s^2 there"""
+    unit: str | None = None
+    """unit of the number that the expression gives, so of angles 'rad'; needed for free names; the
+    channel itself is in SI units"""
+    long_name: str | None = None
+    """name for labels"""
 
     @model_validator(mode="after")
     def _one_way(self) -> DerivedSettings:
         if (self.expression is None) == (self.step is None):
             raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        keys = {key for needed, others, _ in _STEPS.values() for key in (*needed, *others)}
-        given = {key for key in keys if getattr(self, key) is not None}
+        given = self.model_fields_set - {"expression", "source", "step", "unit", "long_name"}
         if self.step is None:
             if self.source is not None or given:
                 raise ValueError("'from' and the keys of steps do not go with 'expression'")
@@ -280,10 +282,10 @@ class DerivedSettings(Table):
 class RedundantSettings(Table):
     """``[redundant.NAME]``: channels that measure one quantity; the first is trusted."""
 
-    channels: Names = Field(description="two channels or more of one unit, the trusted one first")
-    window: Duration | None = optional(
-        "length of the windows compared, s or periods; by default 4 dominant periods"
-    )
+    channels: Names
+    """two channels or more of one unit, the trusted one first"""
+    window: Duration | None = None
+    """length of the windows compared, s or periods; by default 4 dominant periods"""
 
     @model_validator(mode="after")
     def _several(self) -> RedundantSettings:
@@ -308,32 +310,30 @@ class PreparationSettings(Table):
     those of the preset.
     """
 
-    preset: Literal["paper", "recommended"] | None = optional(
-        "'paper' or 'recommended'; left out, the filters (not the rate) of the preset "
-        "of the study, else of [model]"
-    )
-    sampling_rate: Positive | None = optional("samples per second, Hz")
-    dt: Positive | None = optional("time step in seconds")
-    steps_per_period: Annotated[int, Field(ge=4)] | None = optional(
-        "samples per mean encounter period; 32 is the paper's"
-    )
-    attenuation: Annotated[float, Field(ge=50, le=200)] = optional(
-        "attenuation above the new Nyquist frequency, dB, at least 50", 60.0
-    )
-    low_pass: Band | None = optional("[pass, stop] in Hz, of all channels sampled fast enough")
-    anti_alias: bool = optional("false: take samples without a filter at the new Nyquist", True)
-    gaps: Literal["refuse", "mask", "bridge"] = optional(
-        "'refuse': an error; 'mask': NaN where samples are missing; 'bridge': short "
-        "gaps filled and flagged, NaN in the others",
-        "refuse",
-    )
-    longest_gap: Positive = optional("longest gap that 'bridge' fills, s", 0.25)
-    jitter: Literal["refuse", "interpolate"] = optional(
-        "'refuse' or 'interpolate' times that are not uniform", "refuse"
-    )
-    outliers: Literal["flag", "replace"] = optional(
-        "'flag', or 'replace' by what is interpolated across them", "flag"
-    )
+    preset: Literal["paper", "recommended"] | None = None
+    """'paper' or 'recommended'; left out, the filters (not the rate) of the preset of the study,
+    else of [model]"""
+    sampling_rate: Positive | None = None
+    """samples per second, Hz"""
+    dt: Positive | None = None
+    """time step in seconds"""
+    steps_per_period: Annotated[int, Field(ge=4)] | None = None
+    """samples per mean encounter period; 32 is the paper's"""
+    attenuation: Annotated[float, Field(ge=50, le=200)] = 60.0
+    """attenuation above the new Nyquist frequency, dB, at least 50"""
+    low_pass: Band | None = None
+    """[pass, stop] in Hz, of all channels sampled fast enough"""
+    anti_alias: bool = True
+    """false: take samples without a filter at the new Nyquist"""
+    gaps: Literal["refuse", "mask", "bridge"] = "refuse"
+    """'refuse': an error; 'mask': NaN where samples are missing; 'bridge': short gaps filled and
+    flagged, NaN in the others"""
+    longest_gap: Positive = 0.25
+    """longest gap that 'bridge' fills, s"""
+    jitter: Literal["refuse", "interpolate"] = "refuse"
+    """'refuse' or 'interpolate' times that are not uniform"""
+    outliers: Literal["flag", "replace"] = "flag"
+    """'flag', or 'replace' by what is interpolated across them"""
 
     @model_validator(mode="after")
     def _one_rate(self) -> PreparationSettings:
@@ -370,26 +370,30 @@ class RunSettings(Table):
     used for both. `record` cuts the files before anything else is done with them.
     """
 
-    file: str | None = optional("the file, relative to the campaign file")
-    files: dict[str, str] = optional("instrument = its file, relative to the campaign file", {})
-    sea_state: str = optional("a name for the sea state", "")
-    waves: Literal["regular", "irregular", "still"] | None = optional(
-        "'regular', 'irregular', or 'still' of a free decay"
-    )
-    role: Literal["train", "test", "unused"] | None = optional("'train', 'test' or 'unused'")
-    span: Span | None = optional("[start, end] in s or periods ('10 T'): the part used")
-    train: Span | None = optional("[start, end] in s or periods, used for training")
-    test: Span | None = optional("[start, end] in s or periods, used for testing")
-    record: Span | None = optional("[start, end] in s or periods: the part read")
-    channels: dict[str, ChannelSettings] = optional(
-        "keys of [channels.NAME] that differ in this run", {}
-    )
-    probe_offset: Finite | None = optional(
-        "metres by which this run's elevations are carried, positive downstream"
-    )
-    parameters: dict[str, Finite] = optional(
-        "attribute = number, such as draught = 0.083, for the 'parameter' of a model", {}
-    )
+    file: str | None = None
+    """the file, relative to the campaign file"""
+    files: dict[str, str] = Field(default={})
+    """instrument = its file, relative to the campaign file"""
+    sea_state: str = ""
+    """a name for the sea state"""
+    waves: Literal["regular", "irregular", "still"] | None = None
+    """'regular', 'irregular', or 'still' of a free decay"""
+    role: Literal["train", "test", "unused"] | None = None
+    """'train', 'test' or 'unused'"""
+    span: Span | None = None
+    """[start, end] in s or periods ('10 T'): the part used"""
+    train: Span | None = None
+    """[start, end] in s or periods, used for training"""
+    test: Span | None = None
+    """[start, end] in s or periods, used for testing"""
+    record: Span | None = None
+    """[start, end] in s or periods: the part read"""
+    channels: dict[str, ChannelSettings] = Field(default={})
+    """keys of [channels.NAME] that differ in this run"""
+    probe_offset: Finite | None = None
+    """metres by which this run's elevations are carried, positive downstream"""
+    parameters: dict[str, Finite] = Field(default={})
+    """attribute = number, such as draught = 0.083, for the 'parameter' of a model"""
 
     @property
     def serves(self) -> str:
@@ -436,16 +440,16 @@ class ModelSettings(Table):
         init=False
     )
 
-    kind: str = optional(
-        "'hankel_dmdc', 'bayesian_hankel_dmdc', or any other registered kind, such as 'arx'",
-        "hankel_dmdc",
-    )
-    preset: Literal["paper", "recommended"] | None = optional("'paper' or 'recommended'")
-    states: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = Field(
-        description="list of channels that the model forecasts"
-    )
-    inputs: Names = optional("list of channels that drive the model", ())
-    stop: Instant | None = optional("end of the training window, s or periods such as '60 T'")
+    kind: str = "hankel_dmdc"
+    """'hankel_dmdc', 'bayesian_hankel_dmdc', or any other registered kind, such as 'arx'"""
+    preset: Literal["paper", "recommended"] | None = None
+    """'paper' or 'recommended'"""
+    states: Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+    """list of channels that the model forecasts"""
+    inputs: Names = ()
+    """list of channels that drive the model"""
+    stop: Instant | None = None
+    """end of the training window, s or periods such as '60 T'"""
 
     def arguments(self) -> dict[str, Any]:
         """Keys of the constructor that the file states.
@@ -464,15 +468,13 @@ class CampaignSettings(Table):
     campaign: GeneralSettings = GeneralSettings()
     rig: RigSettings = RigSettings()
     files: FileSettings = FileSettings()
-    channels: dict[ChannelName, ChannelSettings] = Field(
-        min_length=1, description="a table [channels.NAME] per channel, empty where defaults fit"
-    )
+    channels: dict[ChannelName, ChannelSettings] = Field(min_length=1)
+    """a table [channels.NAME] per channel, empty where defaults fit"""
     derived: dict[ChannelName, DerivedSettings] = Field({})
     instruments: InstrumentsSettings = InstrumentsSettings()
     redundant: dict[str, RedundantSettings] = Field({})
-    runs: dict[RunName, RunSettings] = Field(
-        min_length=1, description="at least one table [runs.NAME] with a file"
-    )
+    runs: dict[RunName, RunSettings] = Field(min_length=1)
+    """at least one table [runs.NAME] with a file"""
     preparation: PreparationSettings = PreparationSettings()
     model: ModelSettings | None = None
     models: dict[str, ModelSettings] = Field({})

@@ -18,7 +18,7 @@ from seakeep.campaign.pipeline import (
     sync,
 )
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import DataError, MissingFileError, SeakeepError, naming, warn
+from seakeep.errors import DataError, SeakeepError, naming, warn
 from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
@@ -54,13 +54,6 @@ LISTED = 6
 """Errors of runs that one message holds at most."""
 
 
-def spare(failures: Failures | None, run: str, error: SeakeepError) -> None:
-    """Note the error of a run whose files cannot be read, or raise it."""
-    if failures is None or not isinstance(error, DataError | MissingFileError):
-        raise error
-    failures[run] = error
-
-
 def as_one(errors: Mapping[str, SeakeepError]) -> SeakeepError:
     """One error for those of several runs; that of a single run as it is."""
     if len(errors) == 1:
@@ -84,10 +77,12 @@ class Survey:
     kept : dict of str to Run
         Runs that were read for the survey, each until it is wanted.
     clocks : dict of str to dict of str to Clock
-        By run and logger.
+        By run and logger, of those that were read.
     period : float
         Encounter period, s: the stated one, or the mean zero-up-crossing period of the wave
         channel; 0 where it was not asked for.
+    failures : dict of str to SeakeepError
+        Errors of runs that could not be read.
     left_out : dict of str to str
         By run, what it is left out of because it cannot be read, and why.
     doubts : dict of str to list of Finding
@@ -99,6 +94,7 @@ class Survey:
     kept: dict[str, Run]
     clocks: Mapping[str, Mapping[str, Clock]]
     period: float
+    failures: Failures
     left_out: Mapping[str, str]
     doubts: Mapping[str, Sequence[Finding]]
 
@@ -110,15 +106,17 @@ class Survey:
             return self.period / stated.steps_per_period
         return 1.0 / stated.sampling_rate if stated.sampling_rate else stated.dt
 
+    def clocks_of(self, name: str) -> Mapping[str, Clock]:
+        """Clocks of a run by logger; the error with which it could not be read, if there is one."""
+        if name in self.failures:
+            raise self.failures[name]
+        return self.clocks.get(name, {"": Clock()})
+
     def read(self, name: str) -> Run:
         """Steps 1 and 2: a run's files, their clocks known."""
+        clocks, findings = self.clocks_of(name), self.doubts.get(name, ())
         run = self.kept.pop(name, None) or read(name, self.settings, self.files_of(name))
-        return replace(
-            run,
-            period=self.period,
-            clocks=self.clocks[name],
-            findings=self.doubts.get(name, ()),
-        )
+        return replace(run, period=self.period, clocks=clocks, findings=findings)
 
     def channels(self, name: str) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""
@@ -131,13 +129,12 @@ def survey(
     asked: Sequence[str],
     channel: str | None,
     progress: Progress | None,
-    failures: Failures | None,
 ) -> Survey:
     """Read each run once for its clocks and, where a `channel` of waves is given, its period.
 
-    Of runs that are not `asked` for, those that cannot be read are left out of what is pooled, with
-    a warning; of the others, `failures` takes the errors, or they are raised. Drifts are pooled
-    where the campaign does not say otherwise, and one that is not certain is left out.
+    Runs that cannot be read are left out of what is pooled, with a warning unless they are `asked`
+    for, since their errors are raised then. Drifts are pooled where the campaign does not say
+    otherwise, and one that is not certain is left out.
     """
     pools = settings.instruments.pool_drift
     # Those whose drifts are pooled with theirs, too.
@@ -149,7 +146,8 @@ def survey(
     free = KEPT
     clocks = {}
     counted = {}
-    bad, left_out = {}, {}
+    failures: Failures = {}
+    left_out = {}
     for count, name in enumerate(runs, 1):
         if progress:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
@@ -162,9 +160,7 @@ def survey(
             if name in period_runs:
                 counted[name] = _counted(run, str(channel))
         except SeakeepError as error:
-            if name in asked:
-                spare(failures, name, error)
-            bad[name] = error
+            failures[name] = error
             lacks = ["the encounter period"] * (name in period_runs)
             lacks += ["the pooled clock drifts"] * (name in clock_runs and name not in clocks)
             left_out[name] = (
@@ -175,15 +171,14 @@ def survey(
     measured = float(np.mean([each[0] for each in long.values()])) if long else 0.0
     period = settings.campaign.encounter_period or measured
     doubts = {name: each[2] for name, each in counted.items()}
-    if bad and (not clocks or (period_runs and not counted)):
-        raise as_one(bad)
+    if failures and (not clocks or (period_runs and not counted)):
+        raise as_one(failures)
     for name, words in left_out.items():
         if name not in asked:
             warn(words)
     warn_of(chain.from_iterable(doubts.values()), set())
     _settle_drifts(clocks, pools)
-    alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
-    return Survey(settings, files_of, kept, alone | clocks, period, left_out, doubts)
+    return Survey(settings, files_of, kept, clocks, period, failures, left_out, doubts)
 
 
 def _settle_drifts(clocks: Mapping[str, dict[str, Clock]], pools: bool) -> None:

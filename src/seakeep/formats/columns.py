@@ -16,7 +16,7 @@ from pydantic import Field
 from seakeep.arrays import FloatArray
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
-from seakeep.toml import Table, optional, packaged
+from seakeep.toml import Table, packaged
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
 _PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
@@ -177,26 +177,24 @@ def unique_names(headers: Iterable[str]) -> tuple[list[str], list[str | None]]:
 class Options(Table):
     """What is known about a file; what is left out is recognised."""
 
-    time: str | None = optional("the name of the time column")
-    delimiter: Literal[",", ";", "\t", " "] | None = optional(
-        "',' or ';' or '\\t', or ' ' for any number of blanks"
-    )
-    decimal: Literal[".", ","] | None = optional("'.' or ','")
-    comment: Annotated[str, Field(min_length=1)] | None = optional(
-        "the mark that starts a comment line; '#' and '%' are known"
-    )
-    skip_rows: Annotated[int, Field(ge=0)] = optional(
-        "lines to leave out at the head of the file", 0
-    )
-    missing: float | None = optional("number that stands for no reading of a channel, such as -999")
-    encoding: str | None = optional(
-        "of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
-        "UTF-16 with its mark, or Windows-1252 (Latin-1)"
-    )
-    group: str | None = optional(
-        "the part of a file that is read, where it holds several: the group of a TDMS, "
-        "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file"
-    )
+    time: str | None = None
+    """the name of the time column"""
+    delimiter: Literal[",", ";", "\t", " "] | None = None
+    """',' or ';' or '\\t', or ' ' for any number of blanks"""
+    decimal: Literal[".", ","] | None = None
+    """'.' or ','"""
+    comment: Annotated[str, Field(min_length=1)] | None = None
+    """the mark that starts a comment line; '#' and '%' are known"""
+    skip_rows: Annotated[int, Field(ge=0)] = 0
+    """lines to leave out at the head of the file"""
+    missing: float | None = None
+    """number that stands for no reading of a channel, such as -999"""
+    encoding: str | None = None
+    """of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, UTF-16 with its
+    mark, or Windows-1252 (Latin-1)"""
+    group: str | None = None
+    """the part of a file that is read, where it holds several: the group of a TDMS, HDF5 or NetCDF
+    file, the topic of a ROS 2 bag or MCAP file"""
 
 
 @dataclass(frozen=True)

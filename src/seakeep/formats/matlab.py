@@ -31,15 +31,13 @@ def read_matlab(path: Path, options: Options) -> Columns:
     is a fault: a vector of another length than the time, a struct, a list of units without names.
     """
     content = _unwrapped({k: v for k, v in _loaded(path).items() if not k.startswith(("__", "#"))})
-    units = _units(content)
     vectors = _channels(path, content)
     sizes = [vector.size for vector in vectors.values()]
     clock = next((name for name in (options.time, *_TIMES) if name in vectors), None)
     length = vectors[clock].size if clock else max(sizes, key=sizes.count)
     names, in_headers = unique_names(vectors)
-    for name, unit in zip(names, in_headers, strict=True):
-        if unit is not None:
-            units.setdefault(name, unit)
+    said = {name: unit for name, unit in zip(names, in_headers, strict=True) if unit is not None}
+    units = said | _units(content)
     values = dict(zip(names, vectors.values(), strict=True))
     faults = {
         name: f"'{name}' has {vector.size} values, and {'the time' if clock else 'most'} {length}. "

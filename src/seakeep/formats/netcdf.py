@@ -21,16 +21,15 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     ``NAME_n``. `group` may be left out where one group alone holds channels.
     """
     dataset = opened_netcdf(path, options.group)
-    flat = {}
+    flat: dict[str, xr.DataArray] = {}
     faults = {}
-    for name, variable in dataset.variables.items():
-        array = dataset[name] if name in dataset else xr.DataArray(variable)
-        if array.dtype.kind not in "fiub" or array.ndim == 0 or array.size < 2:
-            continue
-        try:
-            flat.update(_split(path, str(name), array))
-        except DataError as error:
-            faults[str(name)] = str(error)
+    for name in dataset.variables:
+        array = dataset[name]
+        if array.dtype.kind in "fiub" and array.size > 1:
+            try:
+                flat |= _split(path, str(name), array)
+            except DataError as error:
+                faults[str(name)] = str(error)
     if not flat and not faults:
         raise DataError(
             f"{path} holds no channels; found variables {', '.join(map(str, dataset.variables))}. "
@@ -40,14 +39,13 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     axis = "time" if "time" in dims else max(dims, key=dims.count, default="time")
     if options.time in flat:
         axis = flat[options.time].dims[0]
-    length = next((array.size for array in flat.values() if array.dims == (axis,)), 0)
     values, units = {}, {}
     for name, array in flat.items():
         if array.dims != (axis,):
             faults[name] = (
                 f"{path}: '{name}' has {array.size} values along '{array.dims[0]}', and the time "
-                f"{length} along '{axis}'. Save channels of one clock, each as long as the time, "
-                "or put each clock's channels into a file of its own."
+                f"{dataset.sizes[axis]} along '{axis}'. Save channels of one clock, each as long "
+                "as the time, or put each clock's channels into a file of its own."
             )
             continue
         values[name] = array.values.astype(float)

@@ -4,13 +4,13 @@ A topic is a table: one row per message, one column per number in it. Needs rosb
 ``ros``; no installation of ROS.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, needing, warn
 from seakeep.formats.columns import UNITS, Columns, Options, decoding
 
@@ -76,8 +76,23 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> Columns:
             f"{path}: the topic '{wanted}' ({chosen[0].msgtype}, {len(received)} messages) holds "
             "no numbers. State another topic with group = 'NAME' in [files]."
         )
+    held = Counter(name for row in numbers for name in row)
+    values = {n: np.array([row[n] for row in numbers]) for n in held if held[n] == len(numbers)}
+    faults = {
+        name: f"{path}: '{name}' of the topic '{wanted}' is in {count} of {len(numbers)} messages, "
+        "since the array varies in length. Map another column."
+        for name, count in held.items()
+        if name not in values
+    }
     kind = chosen[0].msgtype
-    return _columns(path, reader.start_time, wanted, kind, received, stamps, numbers)
+    instants = _times(path, wanted, kind, received, stamps)
+    # Subtracted as integers: a count of nanoseconds since 1970 has more digits than a float.
+    times = {
+        name: 1e-9 * np.array([instant - reader.start_time for instant in own], float)
+        for name, own in instants.items()
+    }
+    units = {name: unit for name in values if (unit := _unit(kind, name)) is not None}
+    return Columns(times | values, units | dict.fromkeys(times, "s"), faults)
 
 
 def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
@@ -117,50 +132,24 @@ def _flat(value: Any, name: str) -> Iterator[tuple[str, float]]:
             yield from _flat(getattr(value, field), f"{name}.{field}" if name else field)
 
 
-def _columns(
-    path: Path,
-    begin: int,
-    topic: str,
-    kind: str,
-    instants: list[int],
-    headers: list[int | None],
-    numbers: list[dict[str, float]],
-) -> Columns:
-    names = dict.fromkeys(key for row in numbers for key in row)
-    values, faults = {}, {}
-    for name in names:
-        if all(name in row for row in numbers):
-            values[name] = np.array([row[name] for row in numbers])
-        else:
-            count = sum(name in row for row in numbers)
-            faults[name] = (
-                f"{path}: '{name}' of the topic '{topic}' is in {count} of "
-                f"{len(numbers)} messages, since the array varies in length. Map another "
-                "column."
-            )
-    received = _seconds(instants, begin)
+def _times(
+    path: Path, topic: str, kind: str, received: list[int], headers: list[int | None]
+) -> dict[str, list[int]]:
+    """Instants (ns) of messages by the name of their column: as stamped, else as received."""
     stamps = [stamp for stamp in headers if stamp is not None]
-    times = {"time": received}
     if len(stamps) == len(headers):
-        times = {"time": _seconds(stamps, begin), "receive_time": received}
-    elif stamps:
+        return {"time": stamps, "receive_time": received}
+    if stamps:
         raise DataError(
             f"{path}: {len(headers) - len(stamps)} of {len(headers)} messages of the topic "
             f"'{topic}' have no stamp in their header. Correct the node that publishes them."
         )
-    elif kind.endswith("Stamped") or kind.startswith("sensor_msgs/"):
+    if kind.endswith("Stamped") or kind.startswith("sensor_msgs/"):
         warn(
             f"{path}: the headers of the topic '{topic}' are not stamped; the times are those "
             "of reception, late by what the transport took."
         )
-    units = {name: unit for name in values if (unit := _unit(kind, name)) is not None}
-    units |= dict.fromkeys(times, "s")
-    return Columns({**times, **values}, units, faults)
-
-
-def _seconds(instants: list[int], begin: int) -> FloatArray:
-    # Subtracted as integers: a count of nanoseconds since 1970 has more digits than a float.
-    return 1e-9 * np.array([instant - begin for instant in instants], float)
+    return {"time": received}
 
 
 def _unit(kind: str, name: str) -> str | None:

@@ -80,7 +80,7 @@ def read_text(path: Path, options: Options) -> Columns:
 
 def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
     """Text with plain ends of lines, from any encoding."""
-    if not raw or raw.isspace():
+    if not raw.strip():
         raise DataError(f"{path} is empty. Export the run again.")
     if encoding is None and raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encoding = "utf-16"
@@ -135,32 +135,29 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
     numeric = (i for i, (_, line) in enumerate(rows[:HEAD]) if _numeric(_cells(line, delimiter)))
     first = next(numeric, HEAD)
     rows = [row for row in rows[:first] if not _RULE.match(row[1])] + rows[first:]
-    headers, *below = (_cells(line, delimiter) for _, line in rows[:2])
-    above = lines[options.skip_rows : rows[0][0] - 1]
+    top, *below = (_cells(line, delimiter) for _, line in rows[:2])
+    above = (line.strip() for line in lines[options.skip_rows : rows[0][0] - 1])
     # Comment lines above the first row that may be a header: as many words as it has cells.
-    comments = [line.lstrip() for line in above if line.lstrip().startswith(marks)]
-    bare = [line.lstrip("".join(marks)).strip() for line in comments]
+    bare = [line.lstrip("".join(marks)).strip() for line in above if line.startswith(marks)]
     for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
         cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
-        if said := [each for each in cells if len(each) == len(headers) and not _numeric(each)]:
+        if titles := [each for each in cells if len(each) == len(top) and not _numeric(each)]:
             break
-    units, at = None, 1
-    if _numeric(headers):
-        if not said and len(rows) < min(len(headers), HEAD):
+    at = 0
+    if not _numeric(top):
+        if len(top) > 2 and not _NUMBER.match(top[0]) and _numeric(top[1:]):
+            words = f"the first line is '{top[0]}' and {len(top) - 1} numbers, which looks"
+            raise _transposed(path, words, len(rows), len(top))
+        titles += [top, *(each for each in below if _units(each, top))]
+        at = 1 + (titles[-1] is not top)
+    elif not titles:
+        if len(rows) < min(len(top), HEAD):
             words = "no header and more columns than rows, which looks"
-            raise _transposed(path, words, len(rows), len(headers))
-        at = 0
-        units = _units(said[-1], said[-2]) if len(said) > 1 else None
-        numbered = [str(i + 1) for i in range(len(headers))]
-        headers = said[-2] if units else said[-1] if said else numbered
-    elif said and (units := _units(headers, said[-1])):
-        headers = said[-1]
-    else:
-        if len(headers) > 2 and not _NUMBER.match(headers[0]) and _numeric(headers[1:]):
-            words = f"the first line is '{headers[0]}' and {len(headers) - 1} numbers, which looks"
-            raise _transposed(path, words, len(rows), len(headers))
-        units = _units(below[0], headers) if below else None
-        at += units is not None
+            raise _transposed(path, words, len(rows), len(top))
+        titles = [[str(i + 1) for i in range(len(top))]]
+    # The last line above the numbers is the header, or its row of units.
+    units = _units(titles[-1], titles[-2]) if len(titles) > 1 else None
+    headers = titles[-2] if units else titles[-1]
     if at >= len(rows):
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
     decimal = options.decimal or _decimal(path, [line for _, line in rows[at:]], delimiter)
@@ -265,13 +262,9 @@ def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
     """Cells of the body, as pandas parses them, with as many in each row as the header has."""
     # Rows with more or fewer cells than the header, which pandas would fill or cut.
     wanted, mark = len(layout.headers), layout.delimiter
+    between = None if mark == " " else mark
     counts = [
-        len(_cells(row, mark))
-        if '"' in row
-        else len(re.findall("[^ \t]+", row))
-        if mark == " "
-        else row.count(mark) + 1
-        for _, row in layout.rows
+        len(_cells(row, mark) if '"' in row else row.split(between)) for _, row in layout.rows
     ]
     if wrong := [i for i, count in enumerate(counts) if count != wanted]:
         first = wrong[0]

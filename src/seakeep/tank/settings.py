@@ -214,8 +214,7 @@ class TankSettings(Table):
     seed: Annotated[int, Field(ge=0, lt=2**64, description="a number from 0 to 2^64 − 1")]
     scale_factor: Positive
     facility: FacilitySettings
-    hull: dict[str, Any]
-    """Dimensions and mesh of the hull; ``tools/build_hydrodynamics.py`` alone reads them."""
+    hull: dict[str, Any]  # dimensions and mesh; tools/build_hydrodynamics.py alone reads them
     vessel: VesselSettings
     drift: DriftSettings
     moorings: dict[ChannelName, LineSettings]
