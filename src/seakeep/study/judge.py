@@ -65,7 +65,7 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
         change over the window along the line of least squares.
     """
     both = paired(**pair)
-    p, m, spread, judged = both
+    p, m, _, spread, judged = both
     lost = np.isnan(p).any(axis=(-2, -1), keepdims=True)
     endless = both._replace(p=np.where(lost, np.inf, p))
     size = root_mean_square(endless.p - m)

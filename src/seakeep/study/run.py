@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep import metrics
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
-from seakeep.core import metrics
 from seakeep.core.calibration import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
