@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -173,7 +173,7 @@ def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
         "dt": plan.dt,
         "longest_training": training_samples(plan.needs) * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
-        "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
+        "models": json.dumps({name: each.description for name, each in plan.models.items()}),
         "versions": json.dumps(versions()),
     }
 
@@ -339,9 +339,8 @@ def _known(facts: xr.Dataset, unit: Unit, windows: Sequence[int]) -> dict[str, F
 def _eigenvalues(fitted: Any) -> xr.Dataset:
     """Eigenvalues of the first members, in descending order of modulus."""
     values = [np.linalg.eigvals(each) for each in islice(fitted.system_matrices(), EIGENVALUES_OF)]
-    padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
-    for row, each in zip(padded, values, strict=True):
-        row[: each.size] = each[np.argsort(-np.abs(each), kind="stable")]
+    ordered = (each[np.argsort(-np.abs(each), kind="stable")] for each in values)
+    padded = np.array([*zip_longest(*ordered, fillvalue=complex(np.nan, np.nan))]).T
     parts = {key: (("member", "mode"), getattr(padded, key)) for key in ("real", "imag")}
     return xr.Dataset(parts)
 
