@@ -56,7 +56,7 @@ from seakeep.study.plan import (
     warn_of_slow_study,
 )
 from seakeep.study.settings import Study
-from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, write_result
+from seakeep.study.store import StudyResult, UnitFolder, write_result
 
 EIGENVALUES_OF = 5
 """Members whose eigenvalues are computed: as many show where those of an ensemble lie."""
@@ -116,16 +116,15 @@ def run_study(
     out = Path(out)
     report = progress or (lambda done, total, what: None)
     folder = UnitFolder(out, study.digest)
-    folder.check()
+    before = folder.check()
     with folder.alone():
-        labels, before = _labels(study), _finished(study, out)
+        labels = _labels(study)
         if before is not None:
             report(1, 1, "finished before")
             result = replace(before, attrs={**before.attrs, **labels})
         else:
             plan = make_plan(study, named(report, "preparing "))
             warn_of_slow_study(plan)
-            folder.open(study.name)
             facts = facts_of(study, plan)
             computed = _computed(plan, facts, folder, executor, report)
             report(len(computed), len(computed), "statistics and densities")
@@ -142,12 +141,6 @@ def run_study(
             write_result(result)
         folder.clear()
     return result
-
-
-def _finished(study: Study, out: Path) -> StudyResult | None:
-    """The result of an earlier run, if there is one of the same study."""
-    result = read_result(out) if (out / RESULT).exists() else None
-    return result if result and result.attrs.get("digest") == study.digest else None
 
 
 def _labels(study: Study) -> dict[str, str]:
