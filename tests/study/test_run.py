@@ -83,7 +83,7 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
     with warned(r"removed 1 unfinished file\(s\) of a killed run"):
         again = run_study(study, out, progress=lambda *each: told.append(each))
     assert (out / "notes.tmp").exists()
-    assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
+    assert next(each[0] for each in told if each[2] == "fitting and forecasting") == 3
     assert_same(finished, again)
 
 

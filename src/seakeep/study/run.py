@@ -179,11 +179,7 @@ def _computed(
     known = {unit: folder.read(unit.name) for unit in units}
     done = {unit: groups for unit, groups in known.items() if groups is not None}
     tasks = tasks_of(plan, [unit for unit in units if unit not in done])
-    members = sum(spec.n_members for spec in plan.specs.values())
-    steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
-    mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
-    taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
-    report(len(done), len(units), f"fitting and forecasting, {taken}")
+    report(len(done), len(units), "fitting and forecasting")
     try:
         for task, computed in as_finished(compute_task, (plan, facts), tasks, executor):
             for unit, groups in zip(task, computed, strict=True):
