@@ -20,7 +20,7 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.calibration import band_scale, calibrated_bounds
-from seakeep.core.density import jsd_intervals
+from seakeep.core.density import NUMBERS, jsd_intervals
 from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, SeakeepError, quiet, warn
@@ -427,10 +427,6 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     return picked[whole], measured, int(np.count_nonzero(~whole))
 
 
-DIVERGENCE = (
-    "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
-    "noise_floor_lower", "noise_floor_upper", "block_length",
-)  # fmt: skip
 CURVES = (
     "value", "measured_mean", "measured_lower", "measured_upper", "predicted_mean",
     "predicted_lower", "predicted_upper",
@@ -458,7 +454,7 @@ def density_tables(
         warn(reason)
     coords = {"model": list(settings.models), "channel": list(channels)}
     both = {**coords, "variant": list(VARIANTS)}
-    divergence = numbered(np.stack(tables, axis=1), (*both, "number"), DIVERGENCE, both)
+    divergence = numbered(np.stack(tables, axis=1), (*both, "number"), NUMBERS, both)
     divergence["diverged_series"] = ("model", [lost for *_, lost in series])
     densities = numbered(np.stack(curves, axis=1), (*coords, "number", "grid"), CURVES, coords)
     return {
@@ -473,7 +469,7 @@ def _channel_densities(
     """Divergences and densities of one channel by model, NaN where there are none, and why."""
     settings, name, segments = data
     channel, forecasts, measured = item
-    table = np.full((len(forecasts), len(VARIANTS), len(DIVERGENCE)), np.nan)
+    table = np.full((len(forecasts), len(VARIANTS), len(NUMBERS)), np.nan)
     curves = np.full((len(forecasts), len(CURVES), 512), np.nan)
     reason, beyond = "", (1 - settings.statistics.level) / 2
     groups = defaultdict[bool, list[int]](list)
@@ -503,7 +499,7 @@ def _channel_densities(
             )
             continue
         for m, *variants in zip(models, *found, strict=True):
-            table[m] = [[getattr(each, number) for number in DIVERGENCE] for each in variants]
+            table[m] = [[getattr(each, number) for number in NUMBERS] for each in variants]
             paper = variants[0]
             lines = [paper.grid]
             for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
