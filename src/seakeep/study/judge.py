@@ -310,8 +310,7 @@ def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) 
         return np.broadcast_to(values, (*judged.shape, *values.shape[1:]))[judged]
 
     against = {key: cells(key) for key in ("measured", "truth") if key in test}
-    known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
-    waves = cells("wave_height") if known else None
+    waves = cells("wave_height") if "wave_height" in test else None
     bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
     over = {"against": list(against), "channel": _names(test)}
     tables: dict[str, list[xr.Dataset]] = defaultdict(list)

@@ -515,19 +515,11 @@ def _known_of(study: Study, plan: Plan, name: str) -> xr.Dataset:
         "run": name,
     }
     if plan.waves is not None:
-        known["wave_height"] = "time", _heights(run[plan.waves], plan.dt)
+        squares = envelope_squared(run[plan.waves].values.astype(float), plan.dt)
+        known["wave_height"] = "time", 2.0 * np.sqrt(squares)
     if (folder := study.truth_folder) is not None:
         known["truth"] = ("time", "channel"), _truth(folder, plan, name)
     return xr.Dataset(known)
-
-
-def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
-    """Twice the envelope of an elevation; NaN in gaps at the ends of the record."""
-    known = np.flatnonzero(np.isfinite(elevation.values))
-    part = slice(known[0], known[-1] + 1)
-    heights = np.full(elevation.size, np.nan)
-    heights[part] = 2.0 * np.sqrt(envelope_squared(elevation.values[part].astype(float), dt))
-    return heights
 
 
 def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
