@@ -91,12 +91,12 @@ def _done(
                 alone = [function(data, item) for item in piece]
             yield piece, alone
         return
-    waiting = iter(pieces)
-    pending: dict[Future[list[Result]], Sequence[Item]] = {}
-    with submitting(function, data, executor) as submit:
+    payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
+    waiting, pending = iter(pieces), dict[Future[list[Result]], Sequence[Item]]()
+    with ending(executor, pending):
         while True:
             for piece in islice(waiting, AHEAD - len(pending)):
-                pending[submit(piece)] = piece
+                pending[executor.submit(_work, token, payload, function, piece)] = piece
             if not pending:
                 return
             finished = _wait_for_any(islice(pending, 1) if ordered else pending, executor)
@@ -240,25 +240,14 @@ def versions() -> dict[str, str]:
 
 
 @contextmanager
-def submitting(
-    function: Function[Data, Item, Result], data: Data, executor: Executor
-) -> Iterator[Callable[[Sequence[Item]], Future[list[Result]]]]:
-    """Hand out items; what is not done is cancelled when the block is left.
+def ending(executor: Executor, pending: Iterable[Future[Any]]) -> Iterator[None]:
+    """Say how work was lost; what is not done is cancelled when the block is left.
 
     Except in a pool of processes: it fails over a cancelled future when its workers are killed.
     """
-    payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
-    under_way = set()  # not the finished: they hold their results
-
-    def submit(items: Sequence[Item]) -> Future[list[Result]]:
-        future = executor.submit(_work, token, payload, function, items)
-        under_way.add(future)
-        future.add_done_callback(under_way.discard)
-        return future
-
     _check_alive(executor)
     try:
-        yield submit
+        yield
     except BrokenProcessPool:  # the pool ends its futures itself
         raise WorkerLostError(
             "a worker process was stopped from outside (was there not enough memory?), or could "
@@ -266,7 +255,7 @@ def submitting(
             "line: if __name__ == '__main__':"
         ) from None
     except BaseException as error:
-        for future in () if on_this_machine(executor) else tuple(under_way):
+        for future in () if on_this_machine(executor) else tuple(pending):
             future.cancel()
         if isinstance(error, CancelledError):
             raise WorkerLostError(

@@ -19,19 +19,26 @@ and this model. For the uncertainty over runs and training sets see
 so that their bounds are rough.
 """
 
-import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import update_wrapper
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction, undefined
-from seakeep.core import metrics as core
+from seakeep import pairing
+from seakeep.arrays import BoolArray, FloatArray, fraction, undefined
 from seakeep.core.bootstrap import block_length, bootstrap_indices, student_interval
+from seakeep.core.metrics import (
+    Pair,
+    extremes_error,
+    over_channels,
+    pair_of,
+    paired,
+    root_mean_square,
+)
 from seakeep.errors import RequestError, quiet
-from seakeep.pairing import Paired, pair
 
 __all__ = [
     "Measure",
@@ -54,116 +61,114 @@ AT_ONCE = 2_000_000
 
 Measure = Callable[..., Any]
 """A measure of arrays, whose result is numbers, and of Datasets, whose result has labels."""
+OfPair = Callable[[Pair], npt.NDArray[Any]]
 
 
 def labelled(
-    measure: Callable[..., Any],
-    keeps: Literal["channel", "time", "neither"],
-    units: str = "1",
-    label: str | None = None,
-) -> Measure:
-    """Let a measure of arrays take Datasets too.
+    keeps: Literal["channel", "time", "neither"], units: str = "1", label: str | None = None
+) -> Callable[[OfPair], Measure]:
+    """Let a measure of a pair of arrays take arrays and Datasets by keyword, and an interval.
 
     Parameters
     ----------
-    measure : callable
-        Of arrays ``predicted=``, ``measured=`` (…, time, channel), ``training_std=`` and
-        ``noise_std=``; :func:`seakeep.core.metrics.paired` checks them.
     keeps : {"channel", "time", "neither"}
-        Which of its last two axes the result still has: of Datasets it is a Dataset, a DataArray
-        over time, or a number.
+        Which of the last two axes of the pair its result still has: of Datasets it is a Dataset, a
+        DataArray over time, or a number.
     units, label : str, optional
         Unit of the result, and what it is called in a long name; by default the function's name.
 
     Returns
     -------
     callable
-        The measure, under the name and docstring of the one of arrays.
+        Decorator of a function of :class:`seakeep.core.metrics.Pair`.
     """
-    name = label or measure.__name__
 
-    @functools.wraps(measure)
-    def judged(
-        *,
-        predicted: Any,
-        measured: Any,
-        training_std: Any = None,
-        noise_std: Any = None,
-        interval: float | None = None,
-    ) -> Any:
-        if isinstance(predicted, xr.Dataset) != isinstance(measured, xr.Dataset):
-            raise RequestError(
-                "predicted and measured must both be Datasets or both be arrays; received "
-                f"{type(predicted).__name__} and {type(measured).__name__}."
-            )
-        if interval is not None and keeps == "time":
-            raise RequestError(f"{name} has a value at each instant, and no interval over time.")
+    def decorate(of: OfPair) -> Measure:
+        name = label or of.__name__
 
-        if not isinstance(predicted, xr.Dataset):
-            known = {"training_std": training_std, "noise_std": noise_std}
-            arrays = {"predicted": predicted, "measured": measured}
-            values = _valued(measure, arrays, known, interval)
-            return values if values.ndim else values.item()
-        pairs, known = _paired(predicted, measured, training_std, noise_std)
-        values = _valued(measure, pairs.arrays, known, interval)
-        coords: dict[str, Any] = {} if interval is None else {"bound": list(BOUNDS)}
-        dims = (*coords, *pairs.lead)
-        if keeps == "channel":
-            return xr.Dataset(
-                {
-                    each: (
-                        dims[: values.ndim - 1],
-                        values[..., column],
-                        {"units": units, "long_name": f"{name} of {each}"},
-                    )
-                    for column, each in enumerate(pairs.names)
-                },
-                coords=coords,
-            )
-        if values.ndim == 0:
-            return values.item()
-        dims += ("time",) * (keeps == "time")
-        coords |= {dim: predicted[dim] for dim in dims if dim in predicted.coords}
-        attrs = {"units": units, "long_name": name}
-        return xr.DataArray(values, coords, dims, name=measure.__name__, attrs=attrs)
+        def measure(
+            *,
+            predicted: Any,
+            measured: Any,
+            training_std: Any = None,
+            noise_std: Any = None,
+            interval: float | None = None,
+        ) -> Any:
+            of_sets = isinstance(predicted, xr.Dataset)
+            if of_sets != isinstance(measured, xr.Dataset):
+                raise RequestError(
+                    "predicted and measured must both be Datasets or both be arrays; received "
+                    f"{type(predicted).__name__} and {type(measured).__name__}."
+                )
+            if interval is not None and keeps == "time":
+                raise RequestError(
+                    f"{name} has a value at each instant, and no interval over time."
+                )
+            if not of_sets:
+                values = _valued(of, paired(predicted, measured, training_std, noise_std), interval)
+                return values if values.ndim else values.item()
+            pairs, pair = _paired(predicted, measured, training_std, noise_std)
+            values = _valued(of, pair, interval)
+            coords: dict[str, Any] = {} if interval is None else {"bound": list(BOUNDS)}
+            dims = (*coords, *pairs.lead)
+            if keeps == "channel":
+                return xr.Dataset(
+                    {
+                        each: (
+                            dims[: values.ndim - 1],
+                            values[..., column],
+                            {"units": units, "long_name": f"{name} of {each}"},
+                        )
+                        for column, each in enumerate(pairs.names)
+                    },
+                    coords=coords,
+                )
+            if values.ndim == 0:
+                return values.item()
+            dims += ("time",) * (keeps == "time")
+            coords |= {dim: predicted[dim] for dim in dims if dim in predicted.coords}
+            attrs = {"units": units, "long_name": name}
+            return xr.DataArray(values, coords, dims, name=of.__name__, attrs=attrs)
 
-    judged.__module__ = __name__
-    return judged
+        update_wrapper(measure, of)
+        del measure.__wrapped__  # type: ignore[attr-defined]  # whose arguments are others
+        return measure
+
+    return decorate
 
 
 def _paired(
     predicted: xr.Dataset, measured: xr.Dataset, training_std: Any = None, noise_std: Any = None
-) -> tuple[Paired, dict[str, Any]]:
-    """Arrays of two Datasets, and the standard deviations that are given or that they carry."""
-    pairs = pair(predicted=predicted, measured=measured)
+) -> tuple[pairing.Paired, Pair]:
+    """Channels of two Datasets, with the standard deviations that are given or that they carry."""
+    pairs = pairing.pair(predicted=predicted, measured=measured)
     known = {"training_std": training_std, "noise_std": noise_std}
     for key, data in zip(known, (predicted, measured), strict=True):
         if known[key] is None:
             known[key] = [data[each].attrs.get(key, 0.0) for each in pairs.names]
-    return pairs, known
+    return pairs, paired(**pairs.arrays, **known)
 
 
-def _valued(
-    measure: Callable[..., Any],
-    arrays: Mapping[str, Any],
-    known: Mapping[str, Any],
-    level: float | None,
-) -> Any:
+def _valued(of: OfPair, pair: Pair, level: float | None) -> FloatArray:
     """A measure, or its bounds over redrawn blocks of instants, shape (2, …)."""
-    value = np.asarray(measure(**arrays, **known))
+    value = np.asarray(of(pair))
     if level is None:
         return value
     if value.dtype == bool:
-        raise RequestError(f"{measure.__name__} says yes or no, and has no interval.")
-    p, m, _, _ = core.paired(**arrays)
-    tails, block = fraction(level, "interval"), _block(p, m)
-    axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
-    redrawn = _redrawn(measure, p, m, known, block)
-    return np.stack(student_interval(value, redrawn, m.shape[-2] / block, tails, axis))
+        raise RequestError(f"{of.__name__} says yes or no, and has no interval.")
+    tails, block = fraction(level, "interval"), _block(pair)
+    redrawn, blocks = _redrawn(of, pair, block), pair.m.shape[-2] / block
+    return np.stack(student_interval(value, redrawn, blocks, tails, _axis_of_draws(pair)))
 
 
-def _block(p: FloatArray, m: FloatArray) -> int:
+def _axis_of_draws(pair: Pair) -> int:
+    """Behind members and windows, in the place of time."""
+    return max(pair.p.ndim, pair.m.ndim) - 2
+
+
+def _block(pair: Pair) -> int:
     """Instants over which those parts of an NRMSE depend on each other that are redrawn."""
+    p, m = pair.p, pair.m
     error, apart = (p - m) ** 2, (m - m.mean(axis=-2, keepdims=True)) ** 2
     with undefined():
         square, variance = (each.mean(axis=-2, keepdims=True) for each in (error, apart))
@@ -175,25 +180,204 @@ def _block(p: FloatArray, m: FloatArray) -> int:
         return 1 if np.ptp(series) == 0 else block_length(series, "politis_white")
 
 
-def _redrawn(
-    measure: Callable[..., Any],
-    p: FloatArray,
-    m: FloatArray,
-    known: Mapping[str, Any],
-    block: int,
-    seed: int = 0,
-) -> FloatArray:
+def _redrawn(of: OfPair, pair: Pair, block: int, seed: int = 0) -> FloatArray:
     """A measure over redrawn blocks of instants; draws lie on the axis of time."""
+    p, m, least = pair.p, pair.m, pair.least
     rows = bootstrap_indices(m.shape[-2], REDRAWN, block, np.random.default_rng(seed))
     # Standard deviations of each window are those of all of its draws.
-    known = {key: np.asarray(each)[..., None, :] if np.ndim(each) > 1 else each
-             for key, each in known.items()}  # fmt: skip
+    least = least[..., None, :] if least.ndim > 1 else least
     step = max(1, AT_ONCE // max(p.size, m.size))
     pieces = [rows[first : first + step] for first in range(0, REDRAWN, step)]
     return np.concatenate(
-        [measure(predicted=p[..., at, :], measured=m[..., at, :], **known) for at in pieces],
-        max(p.ndim, m.ndim) - 2,
+        [of(pair_of(p[..., at, :], m[..., at, :], least)) for at in pieces], _axis_of_draws(pair)
     )
+
+
+@labelled("channel", label="slackness")
+def is_slack(pair: Pair) -> BoolArray:
+    """Say which channels are not judged, because the measurement barely moves or is noise.
+
+    Parameters
+    ----------
+    predicted, measured, training_std, noise_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray of bool, shape (channel,), or Dataset
+        True for a channel whose measured SD is below 1 % of its training SD, or below √2 times
+        that of its noise, or zero.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`nrmse`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> measured = np.stack([np.sin(np.arange(9)), np.zeros(9)], axis=1)
+    >>> is_slack(predicted=measured, measured=measured)
+    array([False,  True])
+    """
+    return ~pair.judged
+
+
+@labelled("channel", label="NRMSE")
+def nrmse(pair: Pair) -> FloatArray:
+    """Root mean square error of each channel, divided by its measured standard deviation.
+
+    Parameters
+    ----------
+    predicted, measured : array_like, shape (…, time, channel), or Dataset
+        Histories in the same units.
+    training_std : array_like, shape (channel,), optional
+        Standard deviations in training, by default the ones that a forecast carries; a channel
+        whose measured SD is below 1 % of it (a slack line) is NaN.
+    noise_std : array_like, shape (…, channel), optional
+        Standard deviations of the noise, by default the ones that prepared runs carry
+        (:func:`seakeep.signals.waves.noise_floor`); a channel more than half of whose measured
+        variance is noise is NaN.
+
+    Returns
+    -------
+    ndarray, shape (…, channel), or Dataset
+        NRMSE (the summand of the paper's ANRMSE, k = 1, SD with ddof = 1 over the window). A
+        forecast that diverged (NaN) gives NaN too.
+
+    Raises
+    ------
+    RequestError
+        If shapes or channels do not fit, or the window has fewer than two samples.
+    DataError
+        If the instants or units of two Datasets differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.linspace(0, 20, 400)
+    >>> measured = np.stack([np.sin(t), np.cos(t)], axis=1)
+    >>> nrmse(predicted=0.9 * measured, measured=measured).round(2)
+    array([0.1, 0.1])
+    """
+    return root_mean_square(pair.p - pair.m) / pair.spread
+
+
+@labelled("neither")
+def anrmse(pair: Pair) -> FloatArray:
+    """Average of :func:`nrmse` over the channels that can be judged (paper, equation ANRMSE).
+
+    Parameters
+    ----------
+    predicted, measured, training_std, noise_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    float, or an array over the leading axes
+        NaN if no channel can be judged, or the forecast diverged.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`nrmse`.
+    """
+    return _anrmse(pair)
+
+
+@labelled("time", label="error in measured standard deviations")
+def error_over_time(pair: Pair) -> FloatArray:
+    """Error at each instant in measured SDs, averaged over the channels: ε(t) of the paper.
+
+    Parameters
+    ----------
+    predicted, measured, training_std, noise_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…, time), or DataArray
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`nrmse`.
+    """
+    return over_channels(
+        np.abs(pair.p - pair.m) / pair.spread[..., None, :], pair.judged[..., None, :]
+    )
+
+
+@labelled("channel", label="NAMMAE")
+def normalised_extremes_error(pair: Pair) -> FloatArray:
+    """Mean absolute error of minimum and maximum of each channel, in measured SDs.
+
+    Parameters
+    ----------
+    predicted, measured, training_std, noise_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…, channel), or Dataset
+        The summand of :func:`nammae`.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`nrmse`.
+    """
+    return extremes_error(pair)
+
+
+@labelled("neither")
+def nammae(pair: Pair) -> FloatArray:
+    """Normalised average minimum/maximum absolute error (paper, equation NAMMAE).
+
+    Parameters
+    ----------
+    predicted, measured, training_std, noise_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    float, or an array over the leading axes
+        Average of :func:`normalised_extremes_error` over the channels that can be judged.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`nrmse`.
+    """
+    return over_channels(extremes_error(pair), pair.judged)
+
+
+@labelled("channel", "%", "fit")
+def fit_percent(pair: Pair) -> FloatArray:
+    r"""Fit of each channel as MATLAB's ``compare`` states it, percent.
+
+    Parameters
+    ----------
+    predicted, measured, training_std, noise_std
+        As for :func:`nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (…, channel), or Dataset
+        :math:`100 (1 - \|y - \hat y\| / \|y - \bar y\|)`: 100 is perfect, 0 is no better than
+        the mean, negative is worse.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`nrmse`.
+    """
+    norm = np.sqrt(np.sum((pair.p - pair.m) ** 2, axis=-2))
+    return 100.0 * (1.0 - norm / (pair.spread * np.sqrt(pair.m.shape[-2] - 1)))
+
+
+def _anrmse(pair: Pair) -> FloatArray:
+    return over_channels(root_mean_square(pair.p - pair.m) / pair.spread, pair.judged)
 
 
 def anrmse_differences(
@@ -240,15 +424,14 @@ def anrmse_differences(
     level = fraction(interval, "interval")
     draws, values, blocks = [], [], []  # per run; of each model with its own blocks, and paired
     for seed, (truth, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
-        pairs = [_paired(each, truth) for each in forecasts]
-        cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in pairs]
-        own = [_block(p, m) for p, m, _ in cases]
-        values.append([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases])
-        alone = [_redrawn(core.anrmse, *case, n) for case, n in zip(cases, own, strict=True)]
-        shared = [_redrawn(core.anrmse, *case, max(own), seed) for case in cases]
+        pairs = [_paired(each, truth)[1] for each in forecasts]
+        own = [_block(each) for each in pairs]
+        values.append([_anrmse(each) for each in pairs])
+        alone = [_redrawn(_anrmse, each, n) for each, n in zip(pairs, own, strict=True)]
+        shared = [_redrawn(_anrmse, each, max(own), seed) for each in pairs]
         lost = np.isnan(values[-1])[:, None]
         draws.append(np.where(lost, np.nan, [alone, shared]))
-        blocks.append(cases[0][1].shape[-2] / np.array([own, [max(own)] * len(own)]))
+        blocks.append(pairs[0].m.shape[-2] / np.array([own, [max(own)] * len(own)]))
     runs = [_with_bounds(*each, level) for each in zip(values, draws, blocks, strict=True)]
     over_runs = {key: np.stack([run[key] for run in runs], axis=-1) for key in runs[0]}
     # The same draws of another run, in another order.
@@ -287,14 +470,3 @@ def _ratio(values: FloatArray) -> FloatArray:
     """Ratio to the first entry; one for the first itself."""
     with undefined():
         return values / values[0]
-
-
-is_slack = labelled(core.is_slack, "channel", label="slackness")
-nrmse = labelled(core.nrmse, "channel", label="NRMSE")
-normalised_extremes_error = labelled(core.normalised_extremes_error, "channel", label="NAMMAE")
-fit_percent = labelled(core.fit_percent, "channel", "%", "fit")
-anrmse = labelled(core.anrmse, "neither")
-nammae = labelled(core.nammae, "neither")
-error_over_time = labelled(
-    core.error_over_time, "time", label="error in measured standard deviations"
-)

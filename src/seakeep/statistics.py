@@ -9,7 +9,6 @@ by channel; text, such as the status of an ensemble's members, is left out. All 
 import functools
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -132,18 +131,15 @@ def jsd_interval(
             draws.append(density.jsd_interval(rows, m[:, column], rng=child, **settings))
         for each in caught:
             warn(f"channel '{name}': {each.message}")
-    arrays = ("draws", "noise", "grid", "predicted", "measured")
-    keys = [field.name for field in fields(JsdInterval) if field.name not in arrays]
     return xr.Dataset(
-        {key: ("channel", [getattr(item, key) for item in draws])
-         for key in (*keys, "uncertainty")},
+        {key: ("channel", [getattr(item, key) for item in draws]) for key in density.NUMBERS},
         coords={"channel": pairs.names},
         attrs={
             "units": "nat",
             "n_series": draws[0].draws.shape[1],
             "bandwidth": settings.get("bandwidth", "paper"),
         },
-    )  # fmt: skip
+    )
 
 
 @functools.wraps(of_arrays.coverage)

@@ -42,7 +42,7 @@ def without_line(folder):
 
 def of_another(folder):
     units = UnitFolder(folder / "out", "0" * 64)
-    units.open("another")
+    units.check()
     units.write("unit", {})
 
 

@@ -94,7 +94,7 @@ def resolved(stated, period=2.0, **how):
     ],
 )  # fmt: skip
 def test_each_key_has_its_value_and_its_source(stated, how, expected):
-    told = json.loads(json.dumps(resolved(stated, **how).to_json()))
+    told = json.loads(json.dumps(resolved(stated, **how).description))
     settings = told["settings"]
     assert {key: (settings[key]["value"], settings[key]["source"]) for key in expected} == expected
     assert told["n_members"] == stated.get("n_members", 100 if told["ensemble"] else 1)

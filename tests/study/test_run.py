@@ -1,6 +1,5 @@
 """A study runs, resumes after a kill, and says what is wrong with what it is given."""
 
-import json
 import shutil
 from dataclasses import replace
 
@@ -84,7 +83,7 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
     with warned(r"removed 1 unfinished file\(s\) of a killed run"):
         again = run_study(study, out, progress=lambda *each: told.append(each))
     assert (out / "notes.tmp").exists()
-    assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
+    assert next(each[0] for each in told if each[2] == "fitting and forecasting") == 3
     assert_same(finished, again)
 
 
@@ -109,7 +108,7 @@ def test_one_process_works_in_a_folder(study_folder, finished):
 @pytest.mark.parametrize("change", [lambda x: x[:40], lambda x: x[:130] + b"4" + x[131:]])
 def test_a_damaged_unit_is_computed_again(change, tmp_path):
     units = UnitFolder(tmp_path, "digest")
-    units.open("study")
+    units.check()
     units.write("one", CELL)
     xr.testing.assert_identical(units.read("one")["cell"], CELL["cell"])
     path = tmp_path / UNITS / "one.nc"
@@ -118,13 +117,23 @@ def test_a_damaged_unit_is_computed_again(change, tmp_path):
 
 
 def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
-    UnitFolder(tmp_path, "one").open("first")
-    second = UnitFolder(tmp_path, "two")
-    second.open("second")
-    assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
+    first, second = (UnitFolder(tmp_path, digest) for digest in ("one", "two"))
+    first.check()
+    second.check()
     second.write("cell", CELL)
-    with request_error("holds the results of another study"):
-        UnitFolder(tmp_path, "one").open("first")
+    second.check()
+    (tmp_path / UNITS / "a damaged one.nc").write_bytes(b"")
+    with request_error("holds the results of another study: its digest starts with two"):
+        first.check()
+
+
+def test_units_of_other_versions_are_not_mixed_with_those_of_this_one(tmp_path, monkeypatch):
+    units = UnitFolder(tmp_path, "one")
+    units.check()
+    units.write("cell", CELL)
+    monkeypatch.setattr("seakeep.study.store.versions", lambda: {"numpy": "3.0"})
+    with request_error(r"was started with numpy .* \(now 3.0\); arrays of both would be mixed"):
+        units.check()
 
 
 def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_path):
@@ -141,13 +150,13 @@ def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_pa
 
 @pytest.mark.parametrize(
     ("result", "words"),
-    [(f"{UNITS}/one.nc", "does not say of which study"), (RESULT, "it has no checksum")],
+    [(f"{UNITS}/one.nc", "none of them says of which study"), (RESULT, "it has no checksum")],
 )
 def test_results_that_name_no_study_are_not_overwritten(result, words, tmp_path):
     (tmp_path / UNITS).mkdir()
     (tmp_path / result).write_bytes(b"")
     with pytest.raises((RequestError, DataError), match=words):
-        UnitFolder(tmp_path, "one").open("first")
+        UnitFolder(tmp_path, "one").check()
 
 
 def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folder):

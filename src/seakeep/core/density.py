@@ -339,6 +339,13 @@ class JsdInterval:
         return self.upper - self.lower
 
 
+NUMBERS = (
+    "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
+    "noise_floor_lower", "noise_floor_upper", "block_length",
+)  # fmt: skip
+"""What a table says of a :class:`JsdInterval`."""
+
+
 def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     r"""Jensen–Shannon divergence of two distributions on one grid.
 

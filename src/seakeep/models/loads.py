@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seakeep import metrics
 from seakeep.arrays import Datasets, FloatArray, IntArray
-from seakeep.core import metrics
 from seakeep.core.readouts import KNOTS, MARGIN, LoadMap, best_place, floor_of, sums, weights_of
 from seakeep.errors import RequestError
 from seakeep.models import labelled

@@ -29,8 +29,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from seakeep import metrics
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
-from seakeep.core import metrics
 from seakeep.core.embedding import spread_means, training_window
 from seakeep.core.gram import PrimalSystem, ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean

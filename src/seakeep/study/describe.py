@@ -7,7 +7,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray, Groups
 from seakeep.campaign import Campaign
-from seakeep.check.parts import whole_span
+from seakeep.check.parts import is_regular, whole_span
 from seakeep.conventions import is_elevation
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.core.metrics import slack_share
@@ -36,15 +36,15 @@ def describe_study(study: Study, plan: Plan) -> Groups:
         "training": _training(plan),
         "runs": _runs(plan),
         **{f"prepared/{name}": _prepared(run) for name, run in plan.runs.items()},
-        "repeats": _repeats(study.campaign, plan),
+        "repeats": _repeats(plan),
         "spectra": _spectra(plan),
     }
     return {name: group for name, group in groups.items() if group is not None}
 
 
-def _repeats(campaign: Campaign, plan: Plan) -> xr.Dataset | None:
+def _repeats(plan: Plan) -> xr.Dataset | None:
     """Runs whose test windows repeat input of their training set; None if there are none."""
-    regular = {name for name, run in campaign.settings.runs.items() if run.waves == "regular"}
+    regular = {name for name, run in plan.runs.items() if is_regular(run)}
     rows = []
     for name in dict.fromkeys(each.run for each in plan.windows if each.run not in regular):
         spans = [
@@ -149,7 +149,7 @@ def _runs(plan: Plan) -> xr.Dataset:
     rows, slack = [], []
     for key, run in plan.runs.items():
         facts, frequency = run.attrs, np.nan
-        if plan.waves is not None and facts.get("waves") == "regular":
+        if plan.waves is not None and is_regular(run):
             elevation = between(run, whole_span(run))[plan.waves].values
             frequency = dominant_frequency(elevation, plan.dt)
         train, test = (facts.get(f"{use}_span", (np.nan, np.nan)) for use in ("train", "test"))

@@ -20,7 +20,7 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.calibration import band_scale, calibrated_bounds
-from seakeep.core.density import jsd_intervals
+from seakeep.core.density import NUMBERS, jsd_intervals
 from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, SeakeepError, quiet, warn
@@ -65,7 +65,7 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
         change over the window along the line of least squares.
     """
     both = paired(**pair)
-    p, m, spread, judged = both
+    p, m, _, spread, judged = both
     lost = np.isnan(p).any(axis=(-2, -1), keepdims=True)
     endless = both._replace(p=np.where(lost, np.inf, p))
     size = root_mean_square(endless.p - m)
@@ -310,8 +310,7 @@ def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) 
         return np.broadcast_to(values, (*judged.shape, *values.shape[1:]))[judged]
 
     against = {key: cells(key) for key in ("measured", "truth") if key in test}
-    known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
-    waves = cells("wave_height") if known else None
+    waves = cells("wave_height") if "wave_height" in test else None
     bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
     over = {"against": list(against), "channel": _names(test)}
     tables: dict[str, list[xr.Dataset]] = defaultdict(list)
@@ -427,10 +426,6 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     return picked[whole], measured, int(np.count_nonzero(~whole))
 
 
-DIVERGENCE = (
-    "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
-    "noise_floor_lower", "noise_floor_upper", "block_length",
-)  # fmt: skip
 CURVES = (
     "value", "measured_mean", "measured_lower", "measured_upper", "predicted_mean",
     "predicted_lower", "predicted_upper",
@@ -445,38 +440,22 @@ def density_tables(
     executor: Executor | None,
 ) -> Groups:
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
-    windows, steps = test.sizes["window"], test.sizes["time"]
-    # Forecasts by model; one that runs far away has a grid of its own.
-    moving = defaultdict[tuple[int, bool], dict[int, FloatArray]](dict)
-    diverged = []
-    for m, model in enumerate(settings.models):
-        predicted, measured, lost = joined(test, model)
-        diverged.append(lost)
-        for c, forecasts in enumerate(np.moveaxis(predicted, 2, 0) if len(predicted) else ()):
-            moves = np.ptp(forecasts.reshape(-1, windows, steps), axis=2).max(axis=1) > 0
-            if moves.all() and np.ptp(measured[:, c]) > 0:  # what stands still has no density
-                # Contiguous, as they are in a worker: sums are then the same to the last bit.
-                far = bool(np.ptp(forecasts) > FAR * np.ptp(measured[:, c]))
-                moving[c, far][m] = forecasts.copy("C")
+    series = [joined(test, model) for model in settings.models]
+    measured = series[0][1]
+    # Contiguous, as they are in a worker: sums are then the same to the last bit.
+    items = [
+        (channel, [predicted[..., c].copy() for predicted, *_ in series], measured[:, c].copy())
+        for c, channel in enumerate(channels)
+    ]
+    data = settings, name, [test.sizes["time"]] * test.sizes["window"]
+    tables, curves, reasons = zip(*in_order(_channel_densities, data, items, executor), strict=True)
+    for reason in filter(None, reasons):
+        warn(reason)
     coords = {"model": list(settings.models), "channel": list(channels)}
-    shape = len(diverged), len(channels)
-    table = np.full((*shape, len(VARIANTS), len(DIVERGENCE)), np.nan)
-    curves = np.full((*shape, len(CURVES), 512), np.nan)
-    data = settings, name, [steps] * windows
-    items = [(channels[c], [*of.values()], measured[:, c].copy()) for (c, _), of in moving.items()]
-    rows = in_order(_channel_densities, data, items, executor)
-    for ((c, _), of), each in zip(moving.items(), rows, strict=True):
-        if isinstance(each, str):
-            warn(
-                f"the densities of {channels[c]} as forecast and as measured, over the windows of "
-                f"'{name}', cannot be compared and are left out: {each}"
-            )
-        else:
-            table[list(of), c], curves[list(of), c] = each
     both = {**coords, "variant": list(VARIANTS)}
-    divergence = numbered(table, (*both, "number"), DIVERGENCE, both)
-    divergence["diverged_series"] = ("model", diverged)
-    densities = numbered(curves, (*coords, "number", "grid"), CURVES, coords)
+    divergence = numbered(np.stack(tables, axis=1), (*both, "number"), NUMBERS, both)
+    divergence["diverged_series"] = ("model", [lost for *_, lost in series])
+    densities = numbered(np.stack(curves, axis=1), (*coords, "number", "grid"), CURVES, coords)
     return {
         "divergence": divergence.assign_attrs(test=name),
         "densities": densities.assign_attrs(test=name),
@@ -485,36 +464,47 @@ def density_tables(
 
 def _channel_densities(
     data: tuple[StudySettings, str, Sequence[int]], item: tuple[str, list[FloatArray], FloatArray]
-) -> tuple[FloatArray, FloatArray] | str:
-    """Divergences and densities of one channel by model, or why there are none."""
+) -> tuple[FloatArray, FloatArray, str]:
+    """Divergences and densities of one channel by model, NaN where there are none, and why."""
     settings, name, segments = data
     channel, forecasts, measured = item
-    variants = {}
-    try:
-        with quiet():  # the table prints the block length
-            for variant, choice in VARIANTS.items():
-                variants[variant] = jsd_intervals(
-                    forecasts,
-                    measured,
-                    block_length=choice["block_length"],
-                    bandwidth=choice["bandwidth"],
-                    segments=None if choice["joins"] else segments,
-                    rng=random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}"),
-                    n_series=settings.statistics.n_series,
-                )
-    except SeakeepError as error:
-        return str(error)
-    tables = [
-        [[getattr(each, number) for number in DIVERGENCE] for each in of_model]
-        for of_model in zip(*variants.values(), strict=True)
-    ]
-    beyond, curves = (1 - settings.statistics.level) / 2, []
-    for paper in variants["paper"]:
-        lines = [paper.grid]
-        for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
-            lines += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
-        curves.append(np.stack(lines))
-    return np.array(tables), np.stack(curves)
+    table = np.full((len(forecasts), len(VARIANTS), len(NUMBERS)), np.nan)
+    curves = np.full((len(forecasts), len(CURVES), 512), np.nan)
+    reason, beyond = "", (1 - settings.statistics.level) / 2
+    groups = defaultdict[bool, list[int]](list)
+    for m, each in enumerate(forecasts):
+        moves = np.ptp(each.reshape(-1, len(segments), segments[0]), axis=2).any(axis=1)
+        if moves.size and moves.all() and np.ptp(measured) > 0:  # what stands still has no density
+            groups[bool(np.ptp(each) > FAR * np.ptp(measured))].append(m)
+    for models in groups.values():  # those that run far away have a grid of their own
+        try:
+            with quiet():  # the table prints the block length
+                found = [
+                    jsd_intervals(
+                        [forecasts[m] for m in models],
+                        measured,
+                        block_length=choice["block_length"],
+                        bandwidth=choice["bandwidth"],
+                        segments=None if choice["joins"] else segments,
+                        rng=random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}"),
+                        n_series=settings.statistics.n_series,
+                    )
+                    for variant, choice in VARIANTS.items()
+                ]
+        except SeakeepError as error:
+            reason = (
+                f"the densities of {channel} as forecast and as measured, over the windows of "
+                f"'{name}', cannot be compared and are left out: {error}"
+            )
+            continue
+        for m, *variants in zip(models, *found, strict=True):
+            table[m] = [[getattr(each, number) for number in NUMBERS] for each in variants]
+            paper = variants[0]
+            lines = [paper.grid]
+            for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
+                lines += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
+            curves[m] = lines
+    return table, curves, reason
 
 
 def is_regular(groups: Datasets, test: str) -> bool:

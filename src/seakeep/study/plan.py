@@ -15,8 +15,9 @@ from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import load_prepared
 from seakeep.check.parts import whole_span
 from seakeep.conventions import is_elevation
-from seakeep.errors import DataError, RequestError, warn
+from seakeep.errors import RequestError, warn
 from seakeep.models import Needs, Spec
+from seakeep.models.labelled import sound_matrix
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import Folds, periods_to_samples
 from seakeep.models.validity import warn_of_slow_motions
@@ -391,7 +392,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
     wanted = list(dict.fromkeys(training_names) | asked)
     runs = load_prepared(campaign, names=wanted, progress=progress)
     for name, run in runs.items():
-        _check_channels(name, run, [*study.states, *study.inputs])
+        sound_matrix(run, [*study.states, *study.inputs], name)
     shared, dt = next(iter(runs.values())).attrs, step_of(runs)
     # Prepared runs hold the period where their preparation counts in it.
     period = general.encounter_period or shared.get("encounter_period")
@@ -478,15 +479,6 @@ def _test_runs(study: Study, name: str) -> list[str]:
             "and test = [start, end], or name other runs."
         )
     return chosen
-
-
-def _check_channels(name: str, run: xr.Dataset, channels: list[str]) -> None:
-    for channel in channels:
-        if not np.all(np.isfinite(run[channel].values)):
-            raise DataError(
-                f"channel '{channel}' of the run '{name}' has missing values. Fill or cut the gap "
-                "in the campaign, or leave the run out."
-            )
 
 
 def warn_of_slow_study(plan: Plan) -> None:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import re
 from collections.abc import Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,7 @@ import xarray as xr
 from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.errors import needing
-from seakeep.executor import on_this_machine, submitting, versions
+from seakeep.executor import ending, on_this_machine, one_blas_thread, versions
 from seakeep.files import MARK, check_output, check_report, is_there, write_text
 from seakeep.study.plan import named
 from seakeep.study.run import run_study
@@ -277,15 +277,17 @@ def prepare_campaigns(
             write_prepared(read_campaign(path), progress=named(progress, "preparing "))
         return
     first, *others = campaigns
-    with submitting(_prepare, None, near) as submit:
-        pending = [submit([path]) for path in others]
+    pending: list[Future[None]] = []
+    with ending(near, pending):
+        pending += [near.submit(_prepare, path) for path in others]
         write_prepared(read_campaign(first), progress=named(progress, "preparing "))
         for each in pending:
             each.result()
 
 
-def _prepare(_: None, path: Path) -> None:
-    write_prepared(read_campaign(path))
+def _prepare(path: Path) -> None:
+    with one_blas_thread():
+        write_prepared(read_campaign(path))
 
 
 def detrended_text(campaign: str) -> str:

@@ -36,35 +36,17 @@ class ResolvedModel:
 
     Parameters
     ----------
-    kind : str
-        As in TOML.
-    preset : str or None
-        What filled in the keys that were not stated.
     spec : Spec
         The settings.
-    sources : mapping of str to str
-        Key → "stated", "preset", "study" (its seed) or "default"; keys of tables are named
+    description : dict
+        JSON values: ``kind``, ``preset`` (what filled in the keys that were not stated), ``role``,
+        ``ensemble`` and ``n_members``; and ``settings``, for each key its ``value`` and its
+        ``source``, "stated", "preset", "study" (its seed) or "default". Keys of tables are named
         ``alignment.KEY`` and ``select.KEY``.
     """
 
-    kind: str
-    preset: str | None
     spec: Spec
-    sources: Mapping[str, Source]
-
-    def to_json(self) -> dict[str, Any]:
-        """Kind, preset, number of members, and value and source of each key, as JSON values."""
-        values = _values(self.spec)
-        return {
-            "kind": self.kind,
-            "preset": self.preset,
-            "role": self.spec.role,
-            "ensemble": self.spec.is_ensemble,
-            "n_members": self.spec.n_members,
-            "settings": {
-                key: {"value": value, "source": self.sources[key]} for key, value in values.items()
-            },
-        }
+    description: dict[str, Any]
 
 
 def _defaults(kind: Any) -> dict[str, Any]:
@@ -130,19 +112,65 @@ def resolve_model(
     RequestError
         If there is no encounter period to count in, or a key is unknown, missing or out of range.
     """
-    kind = _kind_of(settings)
-    if settings.preset not in (None, *presets_of(kind)):
-        raise RequestError(
-            f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
-            f"state its keys: {', '.join(_defaults(kind))}."
-        )
-    alignment = ALIGNMENTS.get(settings.preset or preset or "") if aligned else None
+    kind: Any = _kind_of(settings)
+    stated, named = settings.arguments(), settings.preset or preset
     if settings.preset is None and preset is not None:  # a baseline may lack the paper's
         preset = next((p for p in (preset, "recommended") if p in presets_of(kind)), None)
     else:
         preset = preset_of(settings)
-    stated = settings.arguments()
+    _check(settings, preset, encounter_period)
+    if "select" in stated:
+        stated["select"] = {"period": encounter_period, **_counted(stated["select"])}
+    if "observables" in stated:
+        observables = observables_of(map(_counted, stated["observables"]))
+        stated["observables"] = tuple(counted_in(each, encounter_period) for each in observables)
+    data = {"encounter_period": encounter_period, "dt": dt}
+    from_study: dict[str, Any] = {"seed": seed} if kind.is_ensemble and seed is not None else {}
+    start, by_preset = {**_defaults(kind), **data}, dict[str, Any]()
+    if preset is not None:
+        filled = getattr(kind, preset)(encounter_period, dt)
+        # That of the preset is optional: windows of runs that allow none have no room for it.
+        alignment = ALIGNMENTS.get(named or "") if aligned else None
+        if "alignment" in start and (alignment or (not aligned and "alignment" not in stated)):
+            filled = replace(filled, alignment=alignment)
+        start, by_preset = vars(filled), _values(filled)
+    spec = _spec_of(kind, start, {**from_study, **stated}).resolved(dt, encounter_period)
+    own = stated.get("select") or {}
+    if (open_spec := left_open(spec)) and folds != "auto" and "folds" not in own:
+        spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
+        from_study["select.folds"] = folds
+    known = {*stated, *(f"{name}.{key}" for name in TABLES for key in stated.get(name) or {})}
+
+    def source(key: str) -> Source:
+        if key in known:
+            return "stated"
+        if key in from_study:
+            return "study"
+        default = _defaults(kind).get(key)
+        default = list(default) if isinstance(default, tuple) else default
+        return "preset" if key in by_preset and by_preset[key] != default else "default"
+
+    values = _values(spec)
+    description = {
+        "kind": settings.kind,
+        "preset": preset,
+        "role": spec.role,
+        "ensemble": spec.is_ensemble,
+        "n_members": spec.n_members,
+        "settings": {key: {"value": values[key], "source": source(key)} for key in values},
+    }
+    return ResolvedModel(spec, description)
+
+
+def _check(settings: ModelSettings, preset: str | None, encounter_period: float | None) -> None:
+    """Refuse a preset or a key that a kind has not, and lengths without a period."""
+    kind, stated = _kind_of(settings), settings.arguments()
     known = list(_defaults(kind))
+    if settings.preset not in (None, *presets_of(kind)):
+        raise RequestError(
+            f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
+            f"state its keys: {', '.join(known)}."
+        )
     if unknown := [key for key in stated if key not in known]:
         raise RequestError(
             f"kind = '{settings.kind}' has no key '{unknown[0]}'."
@@ -155,25 +183,35 @@ def resolve_model(
             f"{what} counts in encounter periods, and the campaign has none. State "
             "encounter_period (s) in [campaign]."
         )
-    if "select" in stated:
-        stated["select"] = {"period": encounter_period, **_counted(stated["select"])}
-    if "observables" in stated:
-        observables = observables_of(map(_counted, stated["observables"]))
-        stated["observables"] = tuple(counted_in(each, encounter_period) for each in observables)
-    from_study: dict[str, Any] = {"seed": seed} if kind.is_ensemble and seed is not None else {}
-    filled: Any = None
-    if preset is not None:
-        filled = getattr(kind, preset)(encounter_period, dt)
-        # That of the preset is optional: windows of runs that allow none have no room for it.
-        if "alignment" in known and (alignment or (not aligned and "alignment" not in stated)):
-            filled = replace(filled, alignment=alignment)
-    data = {"encounter_period": encounter_period, "dt": dt}
-    spec = _spec_of(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
-    open_spec = left_open(spec)
-    if open_spec and folds != "auto" and "folds" not in (stated.get("select") or {}):
-        spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
-        from_study["select.folds"] = folds
-    return ResolvedModel(settings.kind, preset, spec, _sources(spec, filled, stated, from_study))
+
+
+def _spec_of(kind: Any, start: Mapping[str, Any], given: dict[str, Any]) -> Spec:
+    """The spec of what is given, and of what its preset or its kind starts from."""
+    settable = [each.name for each in fields(kind) if each.init]
+    start = {key: start[key] for key in settable}
+    for name, table in TABLES.items():
+        if isinstance(given.get(name), dict):
+            check_keys(table, given[name], f"{name}: ")
+            given[name] = replace(start.get(name) or table(), **given[name])
+    if given.get("delay_rows") == "ridge" or given.get("rank") is not None:
+        # Free runs are tried with exact rows alone: what a preset would choose by them is left out.
+        start |= {key: each for key, each in (("select", None), ("readouts", ())) if key in start}
+    if select := start.get("select"):
+        closed = {name: False for name in select.opened if name in given}
+        start["select"] = replace(select, **closed)
+        if given.get("observables") is not None:  # those that are stated are not chosen
+            start["select"] = None
+    values = {**start, **given}
+    if missing := [key for key, value in values.items() if value is MISSING]:
+        as_priors = (
+            " as priors, such as { uniform = ['0.5 T', '1.5 T'] }" if kind.is_ensemble else ""
+        )
+        presets = [f"'{name}'" for name in presets_of(kind)]
+        raise RequestError(
+            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
+            + (f", or a preset: preset = {' or '.join(presets)}." if presets else ".")
+        )
+    return kind(**values)
 
 
 def mistakes_of(
@@ -218,60 +256,6 @@ def _kind_of(settings: ModelSettings) -> type[Spec]:
             f"Kinds: {', '.join(KINDS)}."
         )
     return KINDS[settings.kind]
-
-
-def _spec_of(
-    kind: Any, filled: Any, given: dict[str, Any], data: Mapping[str, float | None]
-) -> Spec:
-    for name, table in TABLES.items():
-        if isinstance(given.get(name), dict):
-            check_keys(table, given[name], f"{name}: ")
-            before = getattr(filled, name, None) or table()
-            given = {**given, name: replace(before, **given[name])}
-    if given.get("observables") is not None and "select" in _defaults(kind):
-        given.setdefault("select", None)  # those that are stated are not chosen
-    if given.get("delay_rows") == "ridge" or given.get("rank") is not None:
-        # Free runs are tried with exact rows alone: what a preset would choose by them is left out.
-        yields = {"select": None, "readouts": ()}
-        given = {**{key: value for key, value in yields.items() if key in _defaults(kind)}, **given}
-    if "select" not in given and (select := getattr(filled, "select", None)) is not None:
-        closed = {name: False for name in select.opened if name in given}
-        given = {**given, "select": replace(select, **closed)} if closed else given
-    if filled is not None:
-        return replace(filled, **given)
-    needed = [key for key, default in _defaults(kind).items() if default is MISSING]
-    if missing := [key for key in needed if key not in given]:
-        as_priors = (
-            " as priors, such as { uniform = ['0.5 T', '1.5 T'] }" if kind.is_ensemble else ""
-        )
-        presets = [f"'{name}'" for name in presets_of(kind)]
-        raise RequestError(
-            f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
-            + (f", or a preset: preset = {' or '.join(presets)}." if presets else ".")
-        )
-    of_data = {each.name for each in fields(kind)} & set(OF_THE_DATA)
-    return kind(**{**{key: data[key] for key in of_data}, **given})
-
-
-def _sources(
-    spec: Spec, filled: Spec | None, stated: Mapping[str, Any], from_study: Mapping[str, Any]
-) -> dict[str, Source]:
-    """Where each setting comes from; a preset counts where it differs from the default."""
-    tables = {f"{name}.{key}" for name in TABLES for key in stated.get(name) or {}}
-    known = {*stated, *tables}
-    defaults = _defaults(type(spec))
-    by_preset = {} if filled is None else _values(filled)
-
-    def source(key: str) -> Source:
-        if key in known:
-            return "stated"
-        if key in from_study:
-            return "study"
-        default = defaults.get(key)
-        default = list(default) if isinstance(default, tuple) else default
-        return "preset" if key in by_preset and by_preset[key] != default else "default"
-
-    return {key: source(key) for key in _values(spec)}
 
 
 def _counted(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep import metrics
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
-from seakeep.core import metrics
 from seakeep.core.calibration import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
@@ -56,7 +56,7 @@ from seakeep.study.plan import (
     warn_of_slow_study,
 )
 from seakeep.study.settings import Study
-from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, write_result
+from seakeep.study.store import StudyResult, UnitFolder, write_result
 
 EIGENVALUES_OF = 5
 """Members whose eigenvalues are computed: as many show where those of an ensemble lie."""
@@ -116,16 +116,15 @@ def run_study(
     out = Path(out)
     report = progress or (lambda done, total, what: None)
     folder = UnitFolder(out, study.digest)
-    folder.check()
+    before = folder.check()
     with folder.alone():
-        labels, before = _labels(study), _finished(study, out)
+        labels = _labels(study)
         if before is not None:
             report(1, 1, "finished before")
             result = replace(before, attrs={**before.attrs, **labels})
         else:
             plan = make_plan(study, named(report, "preparing "))
             warn_of_slow_study(plan)
-            folder.open(study.name)
             facts = facts_of(study, plan)
             computed = _computed(plan, facts, folder, executor, report)
             report(len(computed), len(computed), "statistics and densities")
@@ -142,12 +141,6 @@ def run_study(
             write_result(result)
         folder.clear()
     return result
-
-
-def _finished(study: Study, out: Path) -> StudyResult | None:
-    """The result of an earlier run, if there is one of the same study."""
-    result = read_result(out) if (out / RESULT).exists() else None
-    return result if result and result.attrs.get("digest") == study.digest else None
 
 
 def _labels(study: Study) -> dict[str, str]:
@@ -173,7 +166,7 @@ def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
         "dt": plan.dt,
         "longest_training": training_samples(plan.needs) * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
-        "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
+        "models": json.dumps({name: each.description for name, each in plan.models.items()}),
         "versions": json.dumps(versions()),
     }
 
@@ -186,11 +179,7 @@ def _computed(
     known = {unit: folder.read(unit.name) for unit in units}
     done = {unit: groups for unit, groups in known.items() if groups is not None}
     tasks = tasks_of(plan, [unit for unit in units if unit not in done])
-    members = sum(spec.n_members for spec in plan.specs.values())
-    steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
-    mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
-    taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
-    report(len(done), len(units), f"fitting and forecasting, {taken}")
+    report(len(done), len(units), "fitting and forecasting")
     try:
         for task, computed in as_finished(compute_task, (plan, facts), tasks, executor):
             for unit, groups in zip(task, computed, strict=True):
@@ -339,9 +328,8 @@ def _known(facts: xr.Dataset, unit: Unit, windows: Sequence[int]) -> dict[str, F
 def _eigenvalues(fitted: Any) -> xr.Dataset:
     """Eigenvalues of the first members, in descending order of modulus."""
     values = [np.linalg.eigvals(each) for each in islice(fitted.system_matrices(), EIGENVALUES_OF)]
-    padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
-    for row, each in zip(padded, values, strict=True):
-        row[: each.size] = each[np.argsort(-np.abs(each), kind="stable")]
+    ordered = (each[np.argsort(-np.abs(each), kind="stable")] for each in values)
+    padded = np.array([*zip_longest(*ordered, fillvalue=complex(np.nan, np.nan))]).T
     parts = {key: (("member", "mode"), getattr(padded, key)) for key in ("real", "imag")}
     return xr.Dataset(parts)
 
@@ -527,19 +515,11 @@ def _known_of(study: Study, plan: Plan, name: str) -> xr.Dataset:
         "run": name,
     }
     if plan.waves is not None:
-        known["wave_height"] = "time", _heights(run[plan.waves], plan.dt)
+        squares = envelope_squared(run[plan.waves].values.astype(float), plan.dt)
+        known["wave_height"] = "time", 2.0 * np.sqrt(squares)
     if (folder := study.truth_folder) is not None:
         known["truth"] = ("time", "channel"), _truth(folder, plan, name)
     return xr.Dataset(known)
-
-
-def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
-    """Twice the envelope of an elevation; NaN in gaps at the ends of the record."""
-    known = np.flatnonzero(np.isfinite(elevation.values))
-    part = slice(known[0], known[-1] + 1)
-    heights = np.full(elevation.size, np.nan)
-    heights[part] = 2.0 * np.sqrt(envelope_squared(elevation.values[part].astype(float), dt))
-    return heights
 
 
 def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:

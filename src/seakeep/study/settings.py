@@ -228,32 +228,20 @@ class Study:
         What it says.
     campaign : Campaign
         The campaign; its runs are not read yet.
+    states, inputs : tuple of str
+        Channels that the models forecast, and those that drive them.
     """
 
     path: Path
     settings: StudySettings
     campaign: Campaign
+    states: Names
+    inputs: Names
 
     @property
     def name(self) -> str:
         """Name of the study; the campaign's where it states none."""
         return self.settings.study.name or self.campaign.name
-
-    @property
-    def _channels(self) -> GeneralStudySettings | ModelSettings:
-        """What states the channels: the study, or else a model of the campaign."""
-        stated = self.settings.study
-        return stated if stated.states else self.campaign.model(stated.model)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Channels that the models forecast."""
-        return self._channels.states
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Channels that drive the models."""
-        return self._channels.inputs
 
     @property
     def truth_folder(self) -> Path | None:
@@ -309,7 +297,8 @@ def read_study(path: Path | str) -> Study:
     settings = validated(StudySettings, read_toml(path, "study"), path, "study")
     general = settings.study
     campaign = read_campaign(expand(general.campaign, path.parent), general.preset)
-    study = Study(path, settings, campaign)
+    channels = general if general.states else campaign.model(general.model)
+    study = Study(path, settings, campaign, channels.states, channels.inputs)
     if mistakes := _cross_checks(study):
         raise refusal(path, "study", mistakes)
     return study

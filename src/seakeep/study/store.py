@@ -22,13 +22,10 @@ from seakeep.files import (
     head_of,
     is_there,
     load_groups,
-    read_bytes,
     write_netcdf,
-    write_text,
 )
 
 RESULT = "study.nc"
-HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
 
@@ -77,10 +74,15 @@ class UnitFolder:
     folder: Path
     digest: str
 
-    def check(self) -> None:
+    def check(self) -> StudyResult | None:
         """Refuse, before the work, a folder that cannot be written or holds another study.
 
         A study that was started and has no finished unit is none: nothing of it is lost.
+
+        Returns
+        -------
+        StudyResult or None
+            The result, where this study was finished before.
 
         Raises
         ------
@@ -88,53 +90,44 @@ class UnitFolder:
             If the folder holds the results of another study, or of other versions, or cannot be
             made or written.
         DataError
-            If no header says whose results these are, and their file is damaged.
+            If its result is damaged.
         StorageError
             If the disk fails.
         """
-        units, header = self.folder / UNITS, self.folder / HEADER
+        units = self.folder / UNITS
         with storing(self.folder):
             units.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=units).close()
-        if not ((self.folder / RESULT).exists() or any(units.glob("*.nc"))):
+        result = None
+        if (self.folder / RESULT).exists():
+            result = read_result(self.folder)
+            started = result.attrs
+        elif finished := sorted(units.glob("*.nc")):
+            readable = (groups for path in finished if (groups := _unit(path)))
+            started = next((groups[""].attrs for groups in readable), {})
+        else:
             check_report(self.folder)
-            return
-        started = self._header()
-        if started is None:
+            return None
+        if not started:
             raise RequestError(
-                f"{self.folder} holds results, and {header} does not say of which study. "
-                "Choose another folder (-o), or remove this one."
+                f"{self.folder} holds results, and none of them says of which study. Choose "
+                "another folder (-o), or remove this one."
             )
         if started["digest"] != self.digest:
             raise RequestError(
                 f"{self.folder} holds the results of another study: its digest starts with "
-                f"{str(started['digest'])[:12]} and this study's with {self.digest[:12]}. "
+                f"{started['digest'][:12]} and this study's with {self.digest[:12]}. "
                 "Settings, campaign or raw files have changed since. Give another folder with -o, "
                 "or remove this one."
             )
-        before, now = started.get("versions", {}), versions()
+        before, now = json.loads(started.get("versions", "{}")), versions()
         changed = [f"{k} {before.get(k)} (now {v})" for k, v in now.items() if before.get(k) != v]
         if changed:
             raise RequestError(
                 f"{self.folder} was started with {', '.join(changed)}; arrays of both would be "
                 "mixed. Give another folder with -o, or remove this one."
             )
-
-    def _header(self) -> dict[str, Any] | None:
-        """Digest and versions that the folder states, in its header or else in its result."""
-        if (self.folder / HEADER).exists():
-            return _read_header(self.folder / HEADER)
-        if not (self.folder / RESULT).exists():
-            return None
-        attrs = read_result(self.folder).attrs
-        return {"digest": attrs["digest"], "versions": json.loads(attrs["versions"])}
-
-    def open(self, name: str) -> None:
-        """Make the folder this study's, or see that it belongs to it; errors as :meth:`check`."""
-        self.check()
-        header = {"study": name, "digest": self.digest, "versions": versions()}
-        with storing(self.folder):
-            write_text(self.folder / HEADER, json.dumps(header, indent=1) + "\n")
+        return result
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -172,15 +165,13 @@ class UnitFolder:
 
     def write(self, name: str, groups: Groups) -> None:
         """Keep the groups of a finished unit; errors as :func:`write_groups`."""
-        write_groups(self.folder / UNITS / f"{name}.nc", UNIT, {"digest": self.digest}, groups)
+        attrs = {"digest": self.digest, "versions": json.dumps(versions())}
+        write_groups(self.folder / UNITS / f"{name}.nc", UNIT, attrs, groups)
 
     def read(self, name: str) -> Groups | None:
         """Groups of a finished unit; None where it is not finished, or damaged."""
-        try:
-            groups = load_groups(self.folder / UNITS / f"{name}.nc", UNIT)
-        except SeakeepError:
-            return None
-        return groups if groups.pop("").attrs["digest"] == self.digest else None
+        groups = _unit(self.folder / UNITS / f"{name}.nc")
+        return groups if groups and groups.pop("").attrs["digest"] == self.digest else None
 
     def clear(self) -> None:
         """Remove the units; for when all of them are in the result."""
@@ -190,17 +181,11 @@ class UnitFolder:
             (self.folder / UNITS).rmdir()
 
 
-def _read_header(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(read_bytes(path))
-    except (RequestError, ValueError, RecursionError):
-        content = None
-    if not isinstance(content, dict) or "digest" not in content:
-        raise RequestError(
-            f"{path} is damaged or belongs to no study. Give another folder with -o, or remove "
-            "this one."
-        )
-    return content
+def _unit(path: Path) -> Groups | None:
+    """What the file of a unit holds; None where there is none, or it is damaged."""
+    with suppress(SeakeepError):
+        return load_groups(path, UNIT)
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +326,7 @@ def read_result(folder: Path | str) -> StudyResult:
     """
     folder = Path(folder)
     if not is_there(folder / RESULT):
-        started = (folder / HEADER).exists()
+        started = any((folder / UNITS).glob("*.nc"))
         raise RequestError(
             f"{folder} holds no finished study ({RESULT} is missing). "
             + (
