@@ -182,6 +182,7 @@ inch = 0.0254 * metre = in = inches
 foot = 0.3048 * metre = ft = feet
 minute = 60 * second = min = minutes
 hour = 3600 * second = h = hours
+day = 86400 * second = d = days
 degree = 0.017453292519943295 * radian = deg = ° = degrees
 revolution = 6.283185307179586 * radian = rev = revolutions
 rpm = revolution / minute
@@ -241,8 +242,8 @@ def _parsed(unit: str) -> Any:
         known = sorted({name for name in dir(_registry()) if not name.startswith("_")})
         raise RequestError(
             f"the unit {unit!r} is not known.{did_you_mean(unit, known)} Write it as 'mm', "
-            "'deg/s', 'm/s^2', 'kN', 'g' (standard gravity) or '-' (no unit), or convert the "
-            "column and state an SI unit."
+            "'deg/s', 'm/s^2', 'kN', 'g' (standard gravity), '-' (no unit) or, of times, 's', "
+            "'ms', 'min', 'h' or 'd' (days), or convert the column and state an SI unit."
         ) from error
 
 

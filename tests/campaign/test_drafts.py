@@ -113,6 +113,23 @@ def test_a_draft_asks_whether_slow_files_count_milliseconds(drafted):
         assert ("time_unit = 'ms'" in text) is asks
 
 
+@pytest.mark.parametrize("loggers", [1, 2])
+def test_a_draft_tells_days_and_midnights(tmp_path, drafted, loggers):
+    """The day begins before midnight; a logger beside counts seconds of day."""
+    columns = tank_columns()
+    t = 86390.0 + columns.pop("Time [s]")
+    of_day = {"PLC time": np.round(t % 86400, 3), "load [N]": np.cos(t)}
+    mru = write_csv(tmp_path / "mru.csv", {"Time": 45415 + t / 86400, **columns})
+    plc = write_csv(tmp_path / "plc.csv", of_day)
+    text, campaign = drafted([mru, plc][:loggers])
+    settings = campaign.settings
+    own = settings.instruments["mru"] if loggers > 1 else settings.files
+    assert own.time_unit == "d"
+    assert text.count("time_unit") == 1
+    assert text.count(" 50 samples per second") == loggers
+    assert campaign.prepare()
+
+
 @pytest.mark.parametrize(
     ("header", "factor"), [("t_DAQ", 1), ("QTM_time", 1), ("DAQ time_ms", 1e3)]
 )

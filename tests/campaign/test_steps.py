@@ -4,8 +4,10 @@ from functools import cache
 from math import tau
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from said import data_error
 from seas import sea
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
@@ -246,6 +248,38 @@ def test_a_sensor_that_sticks_is_reported_in_times_that_jitter(tmp_path):
     run = prepared(tmp_path, {"eta_a [m]": x}, text, t + 6e-4 * rng.uniform(-1, 1, t.size))
     (stuck,) = [each for each in findings_of(run) if each.kind.word == "stuck"]
     assert stuck.details["samples"] == 40
+
+
+def test_dates_and_seconds_of_day_are_in_step_over_midnight(tmp_path):
+    """Loggers of each way to write when, some of which start after midnight, and one of none."""
+    names = "shore", "mast", "excel", "matlab", "plc", "camera"
+    t = 86399.5 + np.arange(0, 60, 0.1)
+    dates = pd.Timestamp("2024-05-03") + pd.to_timedelta(t, unit="s")
+    times = (
+        dates.strftime("%Y-%m-%d %H:%M:%S.%f"), dates[10:].strftime("%Y-%m-%dT%H:%M:%S.%fZ"),
+        45415 + t[10:] / 86400, 739375 + t / 86400, t % 86400, dates.strftime("%H:%M:%S.%f"),
+    )  # fmt: skip
+    text = (
+        "[channels]\n[instruments]\nreference = 'shore'\n"
+        "[instruments.camera]\nsampling_rate = 10\noffset = -86399.5\n"
+    )
+    for name, time in zip(names, times, strict=True):
+        write_csv(
+            tmp_path / f"{name}.csv", {"time": time, f"z {name} [m]": t[-len(time) :] - 86400}
+        )
+        days = "time_unit = 'd'\n" * (name in ("excel", "matlab"))
+        text += f"[channels.z_{name}]\ncolumn = 'z {name}'\n"
+        text += f"[instruments.{name}]\n{days}" * (name != "camera")
+    files = "".join(f"{name} = '{name}.csv'\n" for name in names)
+    path = tmp_path / "campaign.toml"
+    path.write_text(f"{text}[preparation]\nsampling_rate = 10\n[runs.r]\n[runs.r.files]\n{files}")
+    run = read_campaign(path).prepare()["r"]
+    assert float(run["time"][0]) == pytest.approx(86400.5)
+    for name in names:  # a channel that is its own instant
+        assert_allclose(run[f"z_{name}"], run["time"] - 86400, rtol=0, atol=1e-3)
+    edit(path, ("[instruments.camera]\n", "[instruments.camera]\ntime = 'time'\n"))
+    with data_error("only where no row is lost, leave time out and state sampling_rate"):
+        read_campaign(path).prepare()
 
 
 WANDER = sea(5, (0.2, 1.0)).at  # without a period of its own, so that a lag is unique

@@ -138,6 +138,25 @@ def test_time_in_the_unit_that_its_name_ends_on(read, name, stated):
     assert_array_equal(slow["time"], [0, 20])
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Zeit;heave [m]\n2024-05-03T23:59:59.900;1,5\n2024-05-04T00:00:00.100;1,6\n",
+        "Zeit;heave [m]\n2024-05-03 23:59:59,900;1,5\n2024-05-04 00:00:00,100;1,6\n",
+        "A logger\n\nDay and hour,heave\nUTC,m\n"
+        "2024-05-04T01:59:59.9+02:00,1.5\n2024-05-04T00:00:00.1Z,1.6\n",
+        "A logger\nof two words\n\ntime heave[m]\n86399.9 1.5\n0.1 1.6\n0.3 1\n0.5 1\n",
+        "time [d],heave [m]\n45415.9999988426,1.5\n45416.0000011574,1.6\n",
+        "datenum [days],heave [m]\n739375.99999884,1.5\n739376.00000116,1.6\n",
+    ],
+)
+def test_dates_count_from_the_midnight_before_the_first(read, text):
+    run = read(text, time="datenum" if "datenum" in text else None)
+    assert_allclose(run["time"][:2], [86399.9, 86400.1], rtol=0, atol=3e-4)
+    assert_array_equal(run["heave"][:2], [1.5, 1.6])
+    assert run["heave"].attrs["units"] == "m"
+
+
 def test_a_unit_of_time_stated_against_the_header(read):
     text = "Zeit [s],heave\n0,1\n0.02,2\n"
     for unit in ("s", "sec"):
@@ -147,6 +166,8 @@ def test_a_unit_of_time_stated_against_the_header(read):
         "Leave time_unit out where the files say it; or, if the file is wrong, correct its header"
     ):
         read(text, time="Zeit", time_unit="ms")
+    with request_error("'dy' is not known.* of times, 's', 'ms', 'min', 'h' or 'd'"):
+        read("t [dy],heave\n0,1\n1,2\n")
     with request_error("the unit 'm' does not fit the time column 't'"):
         read("t [m],heave\n0,1\n1,2\n")
     rated = read(text, sampling_rate=10)  # what the message proposes
@@ -257,8 +278,12 @@ NO_TABLE = {
         " expected a header, then one row per instant and one column per channel",
     "0,0.1,0.2\n1,2,3\n":
         r"run\.csv: no header and more columns than rows, which looks transposed \(2 rows, 3",
-    "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:00.2,2\n":
-        "line 2, column 'time': '2024-05-01 12:00:00.1' is not a number. Write dates and clock",
+    "time,heave\n01.05.2024 12:00:00.1,1\n01.05.2024 12:00:00.2,2\n":
+        "line 2, column 'time': '01.05.2024 12:00:00.1' is not a number. Write instants as in 2024-"
+        "05-03T10:00:00.1 .ISO 8601., or as seconds. Or, only where no row is lost, leave time out",
+    "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:0x,2\n":
+        "line 3, column 'time': '2024-05-01 12:00:0x' is not a number. Write instants as in",
+    "time,heave\n86399.9,1\n0.6,2\n0.7,3\n0.8,3\n": r"not sorted: 0\.6 s follows 86399\.9 s",
     "t,heave,pitch\n0,1,2\n1,2,3\n2,":
         r"line 4: 2 cells where the header has 3 .*It is the last line: the file was cut off",
     "t,heave,heave\n0,1,2\n1,2,3\n":

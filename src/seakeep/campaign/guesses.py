@@ -13,6 +13,7 @@ import numpy as np
 from seakeep.arrays import FloatArray
 from seakeep.campaign.readers import (
     CALLED,
+    from_midnight,
     kinds_of,
     motions_of,
     time_column,
@@ -20,6 +21,7 @@ from seakeep.campaign.readers import (
     time_unit_of,
     words_of,
 )
+from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import (
     MOTIONS,
     Channel,
@@ -33,11 +35,14 @@ from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.quality.faults import noise_share
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
-from seakeep.signals.time_axis import over_gaps, stretches
+from seakeep.signals.time_axis import over_gaps, past_midnight, stretches
 from seakeep.signals.waves import energy_period, first_wave, is_regular
 
 LONG = 64
 """Samples that a column must have for its waves or its step to be judged."""
+
+SERIAL = 2e-5
+"""Step of times of no unit below which they are days: as seconds they would be of 50 kHz."""
 
 USABLE = 0.9
 """Part of a column that must be numbers for it to become a channel with gaps."""
@@ -263,6 +268,11 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
         File(path, table, time_column(table) or ("" if table.sampling_rate else _rising(table)))
         for path, table in zip(paths, tables, strict=True)
     ]
+    for table, time in ((file.table, file.time) for file in files):
+        said = time in table.units or named_unit(time)[1]
+        if not said and (time_step_of(table, time) or 1.0) < SERIAL:
+            table.units[time] = "d"
+        from_midnight(table, FileSettings(time=time))
     folders = [_by_folder(path) for path in paths]
     for keys in (folders, _by_name(files)):
         placed = [
@@ -393,7 +403,8 @@ def _rising(table: Columns) -> str:
         unit = table.units.get(column) or named_unit(column)[1]
         if unit and not (is_unit(unit) and si_unit(unit) == "s"):
             continue
-        if "time" in kinds_of(column) and series.size >= LONG and np.all(np.diff(series) > 0):
+        rises = series.size >= LONG and np.all(np.diff(past_midnight(series)) > 0)
+        if "time" in kinds_of(column) and rises:
             return column
         if not even and _step_of(series) not in (None, 1.0):
             even = column

@@ -27,6 +27,7 @@ from seakeep.campaign.derivation import derive, needed_channels, sources_of
 from seakeep.campaign.readers import (
     counts_samples,
     find_column,
+    from_midnight,
     is_wave,
     time_column,
     time_step_of,
@@ -208,12 +209,17 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path]) -> Ru
             own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate"}
             options = options.model_copy(update=own.model_dump(include=keys, exclude_none=True))
         columns = read_columns(path, options)
-        if key and time_column(columns, options.time):
+        # Times go before a rate, unless they cannot be read and it is this logger's own.
+        time = time_column(columns, options.time)
+        if key and time and not (own.sampling_rate and time in columns.faults):
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
     order = [settings.instruments.reference, *settings.instruments.loggers, *loggers]
     reference = min(loggers, key=order.index)
     loggers = {reference: loggers.pop(reference), **loggers}
+    day = 0.0  # from whose midnight all dates of the run count
+    for each in loggers.values():
+        day = from_midnight(each.columns, each.options, day)
     return Run(name, settings, loggers, settings.campaign.encounter_period or np.nan)
 
 

@@ -16,13 +16,15 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
 from seakeep.formats import Columns, folder_reader, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
-from seakeep.signals.time_axis import check_order, instant_text, usual_step
+from seakeep.signals.time_axis import DAY, check_order, instant_text, past_midnight, usual_step
 from seakeep.toml import packaged
 
 CALLED = packaged("campaign/vocabulary.toml")
 """Words of columns, runs and places in files of others."""
 COUNTED = 64
 """Times from which a column that counts 1, 2, 3 may count samples."""
+DATENUM = 693960
+"""MATLAB's number of the day from which Excel counts."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
 
 
@@ -98,6 +100,7 @@ def read_table(
     """
     path, options = Path(path), options or FileSettings()
     table = read_columns(path, options)
+    from_midnight(table, options)
     time_name, time = times_of(path, table, options)
     # A run has one `time`: a column of that name beside the stated one is left out.
     others = [name for name in table.names if name not in (time_name, "time")]
@@ -144,7 +147,18 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
             bare = name
         if bare.strip().lower() in CALLED["time"]:
             return name
-    return None
+    return next((name for name, unit in table.units.items() if " since " in unit), None)
+
+
+def from_midnight(table: Columns, options: FileSettings, day: float = 0.0) -> float:
+    """Let serial days count from a day, or else the midnight before the first; return that day."""
+    name, values = time_column(table, options.time), table.values
+    unit = time_unit_of(table, name or "", options.time_unit)
+    if name in values and same_unit(unit, "d") and values[name][0] > 1e4:
+        days = values[name] % DATENUM
+        day = day or float(days[0] // 1)
+        values[name] = np.round(DAY * (days - day), 6) / DAY
+    return day
 
 
 def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
@@ -196,8 +210,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
     if name is None or (options.sampling_rate and options.time is None):
         count = next((values.size for values in table.values.values()), 0)
         return name, check_order(np.arange(count) / (rate or 1.0), str(path))
-    if name in table.faults:
-        raise DataError(table.faults[name])
+    find_column(path, table, name)  # refuses one at fault
     stated, said = options.time_unit, _said_unit(table, name)
     unit = time_unit_of(table, name, stated)
     factor = conversion(unit, "s", f"the time column '{name}' of {path}")
@@ -208,7 +221,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
             "correct its header, or leave time and time_unit out and state sampling_rate (Hz) in "
             "[files]."
         )
-    times = table.values[name] * factor
+    times = past_midnight(table.values[name] * factor)
     # Rows that are there twice are left to `check_order`.
     if (again := np.flatnonzero(np.diff(times) == 0)).size:
         pairs = [(x[again], x[again + 1]) for each, x in table.values.items() if each != name]

@@ -25,6 +25,10 @@ SHORT_END = 100
 """Rows at the end of a text whose last cells are compared with that of a line that has no end."""
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z", re.ASCII)
+_INSTANT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:", re.ASCII)
+"""How an instant of ISO 8601 starts."""
+DAY_0 = "1899-12-30"
+"""Day from which Excel counts."""
 _MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
 _OPENED = "[", "("
 _NO_THOUSANDS = re.compile(r"(?<!\d)0\d*,|(?<!\d),|\d{4},|,(?!\d{3}(?!\d))", re.ASCII)
@@ -242,9 +246,8 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _numeric(cells: list[str]) -> bool:
     """Whether these are the cells of a row of data: numbers, or nothing where one is missing."""
-    return any(map(_NUMBER.match, cells)) and all(
-        _NUMBER.match(cell) or cell.lower() in _MISSING for cell in cells
-    )
+    data = [cell for cell in cells if cell.lower() not in _MISSING]
+    return bool(data) and all(_NUMBER.match(cell) or _INSTANT.match(cell) for cell in data)
 
 
 def _units(cells: list[str], headers: list[str]) -> list[str] | None:
@@ -355,11 +358,23 @@ def _columns(path: Path, frame: pd.DataFrame, layout: _Layout) -> Columns:
             continue
         if (unit := units[i]) is not None:
             out.units[name] = unit
+        column = frame[i]
+        if _INSTANT.match(str(column[0])):
+            column, out.units[name] = _days(column), f"days since {DAY_0}"
         try:
-            out.values[name] = _numbers(path, name, frame[i], layout)
+            out.values[name] = _numbers(path, name, column, layout)
         except DataError as error:
             out.faults[name] = str(error)
     return out
+
+
+def _days(column: pd.Series) -> pd.Series:
+    """Serial days of instants of ISO 8601; of a column that holds others, these alone."""
+    text = column.str.replace(",", ".")
+    instants = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
+    others = column.where(instants.isna())
+    days = (instants - pd.Timestamp(DAY_0, tz="UTC")) / pd.Timedelta("1D")
+    return others if others.count() else days
 
 
 def _numbers(path: Path, name: str, column: pd.Series, layout: _Layout) -> FloatArray:
@@ -368,7 +383,7 @@ def _numbers(path: Path, name: str, column: pd.Series, layout: _Layout) -> Float
         return column.to_numpy(dtype=float)
     out = np.empty(len(column))
     for row, cell in enumerate(column):
-        number = np.nan if pd.isna(cell) else _number(str(cell).strip(), layout.decimal)
+        number = _number(str(cell).strip(), layout.decimal)
         if number is None:
             raise DataError(
                 f"{path}, line {layout.rows[row][0]}, column '{name}': {cell!r} is not a number. "
@@ -391,8 +406,9 @@ def _number(cell: str, decimal: str) -> float | None:
 def _mend(cell: str) -> str:
     if re.search(r"\d[-/:]\d", cell):
         return (
-            "Write dates and clock times as seconds from the start of the run, or leave the column "
-            "out and state sampling_rate (Hz) in [files]."
+            "Write instants as in 2024-05-03T10:00:00.1 (ISO 8601), or as seconds. Or, only where "
+            "no row is lost, leave time out and state sampling_rate (Hz): in [files], or of one "
+            "logger of several in [instruments.NAME]."
         )
     if re.search(r"\d([.,' ])\d{3}(\1\d{3}|[.,]\d)*\b", cell):
         return "If its mark divides thousands, export the file without such marks."

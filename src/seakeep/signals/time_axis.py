@@ -18,6 +18,10 @@ STEP_TOLERANCE = 0.01
 """A time axis is uniform if no instant is further than this part of a step from its grid."""
 
 
+DAY = 86400.0
+"""Seconds of a day."""
+
+
 def instant_text(instant: float, dt: float) -> str:
     """Write an instant to a thousandth of a time step, for any origin of time.
 
@@ -109,6 +113,23 @@ class Clock:
         """Clock of another drift, which reads the same in the middle of what this rests on."""
         offset = self.offset + (self.drift - drift) * self.centre
         return replace(self, offset=offset, drift=drift, method=f"{self.method}, {why}")
+
+
+def past_midnight(time: FloatArray) -> FloatArray:
+    """Seconds of day that go on counting after midnight, where they fall by a day less few steps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> past_midnight(np.array([86399.5, 86399.75, 0.0, 0.25]))
+    array([86399.5 , 86399.75, 86400.  , 86400.25])
+    """
+    steps = np.diff(time)
+    if not (steps < 0).any():
+        return time
+    ahead = steps + DAY
+    midnights = (ahead > 0) & (ahead < 5 * np.median(steps))
+    return time + DAY * np.cumsum([0, *midnights])
 
 
 def check_order(time: ArrayLike, name: str) -> FloatArray:
