@@ -197,11 +197,6 @@ _MISTAKE = "mistake"
 """Kind of the errors of pydantic that hold our words."""
 
 
-def optional(description: str, default: Any = None) -> Any:
-    """Key that may be left out; its description is the remedy in a message."""
-    return Field(default=default, description=description)
-
-
 def in_seconds(value: float | Length, period: float) -> float:
     """Value of a key in seconds or hertz, for an encounter period in seconds."""
     return value.at(period) if isinstance(value, Length) else value

@@ -26,7 +26,6 @@ from seakeep.toml import (
     Names,
     Positive,
     Table,
-    optional,
     read_toml,
     refusal,
     validated,
@@ -42,51 +41,53 @@ Placement = Literal["random", "apart"]
 class GeneralStudySettings(Table):
     """``[study]``: which campaign, which channels, which preset, which seed."""
 
-    campaign: str = Field(description="the campaign file, relative to the study file")
-    name: str = optional("a name for titles and tables", "")
-    description: str = optional("free text", "")
-    model: str | None = optional("key of the campaign's [models.NAME] whose channels are used")
-    states: Names = optional("list of channels that the models forecast", ())
-    inputs: Names = optional("list of channels that drive the models", ())
-    preset: Preset = optional("'paper' or 'recommended', for models that state no other", "paper")
-    seed: Annotated[int, Field(ge=0, lt=2**64)] = optional(
-        "an integer, 0 or more and below 2^64", 0
-    )
-    encounter_period: Positive | None = optional(
-        "seconds, that lengths are multiples of; left out, the campaign's"
-    )
-    truth: str | None = optional("folder of RUN.nc with the true channels (the virtual tank's)")
+    campaign: str
+    """the campaign file, relative to the study file"""
+    name: str = ""
+    """a name for titles and tables"""
+    description: str = ""
+    """free text"""
+    model: str | None = None
+    """key of the campaign's [models.NAME] whose channels are used"""
+    states: Names = ()
+    """list of channels that the models forecast"""
+    inputs: Names = ()
+    """list of channels that drive the models"""
+    preset: Preset = "paper"
+    """'paper' or 'recommended', for models that state no other"""
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = 0
+    """an integer, 0 or more and below 2^64"""
+    encounter_period: Positive | None = None
+    """seconds, that lengths are multiples of; left out, the campaign's"""
+    truth: str | None = None
+    """folder of RUN.nc with the true channels (the virtual tank's)"""
 
 
 class StudyModelSettings(ModelSettings):
     """``[models.NAME]`` of a study: as in a campaign, with the study's channels and preset."""
 
-    states: Names = optional("left out: the study's", ())
-    inputs: Names = optional("left out: the study's", ())
+    states: Names = ()
+    """left out: the study's"""
+    inputs: Names = ()
+    """left out: the study's"""
 
 
 class TrainingSettings(Table):
     """``[training]``: what the models learn from."""
 
-    scheme: Literal["halves", "pooled", "leave_out"] = optional(
-        "'halves' (windows of the training spans), 'pooled' (all training spans at "
-        "once) or 'leave_out' (all runs but those that test)",
-        "halves",
-    )
-    runs: Names = optional("list of runs; left out, the training runs", ())
-    leave_out: Literal["auto", "run", "sea_state"] = optional(
-        "'auto', a run and those that repeat its waves; 'run', a run alone; "
-        "'sea_state', all runs of one sea state at once",
-        "auto",
-    )
-    windows: Count | None = optional(
-        "a number of training windows, with placement = 'apart' at most; belongs to "
-        "scheme = 'halves'",
-        10,
-    )
-    placement: Placement = optional(
-        "'random' as in the paper, or 'apart': without overlap", "random"
-    )
+    scheme: Literal["halves", "pooled", "leave_out"] = "halves"
+    """'halves' (windows of the training spans), 'pooled' (all training spans at once) or
+    'leave_out' (all runs but those that test)"""
+    runs: Names = ()
+    """list of runs; left out, the training runs"""
+    leave_out: Literal["auto", "run", "sea_state"] = "auto"
+    """'auto', a run and those that repeat its waves; 'run', a run alone; 'sea_state', all runs of
+    one sea state at once"""
+    windows: Count | None = 10
+    """a number of training windows, with placement = 'apart' at most; belongs to scheme =
+    'halves'"""
+    placement: Placement = "random"
+    """'random' as in the paper, or 'apart': without overlap"""
 
     @model_validator(mode="after")
     def _keys_fit_scheme(self) -> TrainingSettings:
@@ -106,70 +107,58 @@ class TestSetSettings(Table):
 
     __test__ = False  # not a test class, although pytest would collect it by its name
 
-    runs: Names = optional("list of runs; left out, the test runs", ())
-    waves: Literal["regular", "irregular"] | None = optional(
-        "'regular' or 'irregular': only such runs; a run whose waves are not stated "
-        "counts as irregular"
-    )
-    windows: Count | None = optional("number of test windows; with placement = 'apart' at most", 10)
-    length: Positive = optional("length of a window in encounter periods", 15.0)
-    placement: Placement = optional(
-        "'random' as in the paper, or 'apart': without overlap", "random"
-    )
-    part: Literal["test", "whole"] | None = optional(
-        "where windows are placed: in the 'test' spans, or in 'whole' runs; left out, "
-        "in whole runs with scheme = 'leave_out' alone"
-    )
-    startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = optional(
-        "seconds cut off the start of each test span", 0.0
-    )
-    label: str = optional("words for titles", "")
+    runs: Names = ()
+    """list of runs; left out, the test runs"""
+    waves: Literal["regular", "irregular"] | None = None
+    """'regular' or 'irregular': only such runs; a run whose waves are not stated counts as
+    irregular"""
+    windows: Count | None = 10
+    """number of test windows; with placement = 'apart' at most"""
+    length: Positive = 15.0
+    """length of a window in encounter periods"""
+    placement: Placement = "random"
+    """'random' as in the paper, or 'apart': without overlap"""
+    part: Literal["test", "whole"] | None = None
+    """where windows are placed: in the 'test' spans, or in 'whole' runs; left out, in whole runs
+    with scheme = 'leave_out' alone"""
+    startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    """seconds cut off the start of each test span"""
+    label: str = ""
+    """words for titles"""
 
 
 class StatisticsSettings(Table):
     """``[statistics]``: bootstrap and bands."""
 
-    n_series: Annotated[int, Field(ge=2)] = optional(
-        "number of bootstrapped series, 2 or more", 100
-    )
-    level: Annotated[float, Field(gt=0, lt=1)] = optional(
-        "probability of the band, such as 0.95", 0.95
-    )
-    split_period: Positive = optional(
-        "period between the low-frequency and the wave-frequency band of ε(t), in "
-        "encounter periods",
-        3.0,
-    )
-    calibrate: bool | None = optional(
-        "whether the bands of ensembles are calibrated too, on training data that "
-        "members have not read; left out, with preset = 'recommended' alone"
-    )
-    scale: Literal["spread", "constant", "learnt"] = optional(
-        "what the half-width of a calibrated band follows: 'spread', that of the "
-        "members with a floor, 'constant', the members' band moved by as much everywhere, or "
-        "'learnt' from spread, horizon and waves",
-        "spread",
-    )
-    densities_of: str | None = optional(
-        "the test set whose densities are compared; left out, the first"
-    )
+    n_series: Annotated[int, Field(ge=2)] = 100
+    """number of bootstrapped series, 2 or more"""
+    level: Annotated[float, Field(gt=0, lt=1)] = 0.95
+    """probability of the band, such as 0.95"""
+    split_period: Positive = 3.0
+    """period between the low-frequency and the wave-frequency band of ε(t), in encounter periods"""
+    calibrate: bool | None = None
+    """whether the bands of ensembles are calibrated too, on training data that members have not
+    read; left out, with preset = 'recommended' alone"""
+    scale: Literal["spread", "constant", "learnt"] = "spread"
+    """what the half-width of a calibrated band follows: 'spread', that of the members with a floor,
+    'constant', the members' band moved by as much everywhere, or 'learnt' from spread, horizon and
+    waves"""
+    densities_of: str | None = None
+    """the test set whose densities are compared; left out, the first"""
 
 
 class OutputSettings(Table):
     """``[output]``: what is kept beside the arrays that are judged, and what a report shows."""
 
-    shown_windows: Annotated[int, Field(ge=0)] = optional(
-        "windows of the first test set that figures show; of the others one", 2
-    )
-    eigenvalues: bool = optional("true or false", True)
-    regularisation: bool = optional(
-        "whether single models with delay_rows = 'ridge' are identified without λ and "
-        "by truncated singular values too, to compare stability, time and error",
-        False,
-    )
-    paper: bool = optional(
-        "whether the report puts the paper's published divergences beside those of the study", False
-    )
+    shown_windows: Annotated[int, Field(ge=0)] = 2
+    """windows of the first test set that figures show; of the others one"""
+    eigenvalues: bool = True
+    """true or false"""
+    regularisation: bool = False
+    """whether single models with delay_rows = 'ridge' are identified without λ and by truncated
+    singular values too, to compare stability, time and error"""
+    paper: bool = False
+    """whether the report puts the paper's published divergences beside those of the study"""
 
 
 class StudySettings(Table):
