@@ -10,7 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.interpolate import interp1d
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefined
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real
 from seakeep.check.parts import (
     HERTZ,
     Part,
@@ -26,7 +26,7 @@ from seakeep.check.parts import (
     wave_turns,
 )
 from seakeep.conventions import is_elevation
-from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
+from seakeep.core.harmonics import dominant_frequency, estimate, half_angle, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
@@ -290,9 +290,6 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
         raise no_energy(model.inputs[reference])
     at = np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0))
     gain, half = gain[at, 0], radius[at, 0]
-    amplitude = np.abs(gain)
-    with undefined():
-        turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
     name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
     frequency = spectra.frequency[at]
     return _points(
@@ -300,7 +297,7 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
         {"run": name, "kind": "irregular", "frequency": frequency, "wave_amplitude": np.nan},
         gain,
         half,
-        turn,
+        half_angle(half, np.abs(gain)),
         coherence=spectra.ordinary()[at, 0],
     )
 

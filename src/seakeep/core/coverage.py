@@ -6,7 +6,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, undefined
+from seakeep.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    as_real,
+    finite,
+    fraction,
+    ratio,
+    undefined,
+)
 from seakeep.errors import DataError, RequestError
 
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
@@ -174,7 +183,7 @@ def band_crps(
     quantile = float(special.ndtri(0.5 + 0.5 * fraction(level, "level")))
     with undefined():
         spread, error = (high - low) / (2.0 * quantile), np.abs(y - 0.5 * (low + high))
-        z = np.divide(error, spread, out=np.zeros_like(error), where=spread > 0)
+        z = ratio(error, spread, 0.0)
         density = np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
         score = spread * (z * special.erf(z / np.sqrt(2.0)) + 2.0 * density - 1.0 / np.sqrt(np.pi))
     crps = np.where(spread > 0, score, error)

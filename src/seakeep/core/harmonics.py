@@ -159,5 +159,10 @@ def estimate(ratios: ComplexArray, type_b: FloatArray) -> Estimate:
             both = np.hypot(type_a, type_b)
             freedom = np.where(type_a > 0, (count - 1) * (both / type_a) ** 4, np.inf)
             widths.append(stats.t.ppf(0.5 + 0.5 * COVERAGE, freedom) * both)
-        phase = np.where(widths[1] < modulus, np.arcsin(widths[1] / modulus), np.pi)
-    return Estimate(mean, widths[0], phase)
+    return Estimate(mean, widths[0], half_angle(widths[1], modulus))
+
+
+def half_angle(radius: FloatArray, modulus: FloatArray) -> FloatArray:
+    """Most that the phase of a number differs from that of any within a radius of it, rad."""
+    with undefined():
+        return np.where(radius < modulus, np.arcsin(radius / modulus), np.pi)

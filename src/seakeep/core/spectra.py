@@ -213,8 +213,7 @@ def autocorrelation(pieces: Sequence[FloatArray], lags: int) -> FloatArray:
     lags = min(lags, max(map(len, pieces)) - 1)
     centred = [x - x.mean(axis=0) for x in pieces]
     total = np.sum([_products(x, x, lags) for x in centred], axis=0)
-    with undefined():
-        return total / total[:1]
+    return ratio(total, total[:1])
 
 
 def ljung_box(correlation: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
@@ -266,8 +265,7 @@ def input_correlation(
     both_of = zip(residuals, inputs, strict=True)
     total = sum(_products(r[:, :, None], v[:, None], lags) for r, v in both_of)
     of_e, of_u = (sum((part**2).sum(axis=0) for part in side) for side in (residuals, inputs))
-    with undefined():
-        return total / np.sqrt(np.multiply.outer(of_e, of_u)), limit
+    return ratio(total, np.sqrt(np.multiply.outer(of_e, of_u))), limit
 
 
 def _products(x: FloatArray, past: FloatArray, lags: int) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, undefined
+from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, ratio
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.readouts import FittedReadOut
@@ -177,8 +177,8 @@ def lead_errors(
     longest_first = sorted(stretches, key=lambda each: each.first - each.last)
     errors = _errors(forecast, delays, longest_first, steps, WINDOWS, readouts)
     known = np.isfinite(errors)
-    with undefined():  # where all have diverged
-        square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
+    # NaN where all have diverged.
+    square = ratio(np.where(known, errors**2, 0.0).sum(axis=0), known.sum(axis=0))
     square = square[np.isfinite(square).all(axis=1)]
     # One step is what the residuals are, of which there are more.
     read_off = [each.column for each in readouts if each.acts]

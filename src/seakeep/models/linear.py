@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefined
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, ratio, undefined
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
@@ -604,8 +604,8 @@ def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
         # An eigenvalue of zero is gone after a step: overdamped, not undefined.
         oscillating = (natural > 0) & np.isfinite(natural)
         damping = np.where(oscillating, -poles.real / natural, 1.0)
-        decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
-        period = np.where(frequency > 0, 1.0 / frequency, np.inf)
+        decay = ratio(1.0, -poles.real, np.inf)
+        period = ratio(1.0, frequency, np.inf)
     table = {
         "eigenvalue": (upper, "1", "eigenvalue of the discrete system"),
         "modulus": (np.abs(upper), "1", "modulus of the eigenvalue"),

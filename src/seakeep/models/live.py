@@ -34,6 +34,7 @@ from seakeep.arrays import (
     fraction,
     plain,
     positive,
+    ratio,
     undefined,
     whole_number,
 )
@@ -337,8 +338,7 @@ class Live:
         before the first. NaN where there is none yet.
         """
         self._finish()
-        with undefined():  # 0/0 before the first
-            means: FloatArray = self._squares[0] / self._squares[1]
+        means: FloatArray = ratio(*self._squares)
         return means
 
     @property
