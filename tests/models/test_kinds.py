@@ -88,6 +88,24 @@ def test_recommended_names_a_subspace_model_where_noise_spoils_delayed_states():
     short = {name: run.isel(time=slice(75)) for name, run in given.items()}
     few = replace(spec, state_delays=40, select={"horizon": 1.0})
     assert "subspace" not in few.settled(short, ["heave"], ["eta"]).note
+    # Nor does one, which is held out first.
+    one = given | {"run 0": given["run 0"].isel(time=slice(25))}
+    few = replace(spec, state_delays=12, input_delays=12, select={"horizon": 0.5})
+    assert "subspace" not in few.settled(one, ["heave"], ["eta"]).note
+
+
+def test_a_filter_is_taken_where_a_subspace_model_is_better_still():
+    """A damped motion that 31 delayed inputs tell, in noise that spoils three delayed states."""
+    given = {}
+    for seed in range(4):
+        eta, noise = np.random.default_rng(seed).standard_normal((2, 600))
+        motion = lfilter([0.0, 1.0], [1.0, -2 * 0.6 * np.cos(2 * np.pi / 16), 0.36], eta)
+        heave = motion + motion.std() * noise
+        given[f"run {seed}"] = record(0.1, {"encounter_period": 1.6}, heave=heave, eta=eta)
+    spec = HankelDMDc(2, 30, "rollout", delay_rows="exact", ridge_scale="per_snapshot")
+    chosen = spec.settled(given, ["heave"], ["eta"])
+    assert "kind = 'subspace' errs 0." in chosen.note
+    assert isinstance(chosen.rival, FIR)
 
 
 @pytest.mark.parametrize("spec", [FIR(24, 1e-3, lead=3), Subspace(8, 24, 0.1), ARX(8, 16, 1e-2)])

@@ -60,6 +60,7 @@ CHECKS: dict[str, Callable[..., xr.Dataset]] = {
 }
 """Checks by name: of what there is, each takes what its parameters are called.
 
+The first makes free runs that start where the baselines can be forecast too.
 There are a `model` and prepared `runs` by name, and what checks share: `free` runs of model and
 `baselines`, and the `measured` response.
 """

@@ -216,9 +216,12 @@ def beside(
 
 
 def linear_part(model: Model) -> HankelDMDcModel | None:
-    """A model without its observables and read-outs, of an ensemble a member; None without any."""
+    """A model without its observables and read-outs, of an ensemble a member.
+
+    None where the rest is no linear map of the inputs, as where it follows its own surge.
+    """
     member = model.member(0) if is_ensemble(model) else model
-    if not is_linear(member) or member.variation:
+    if not is_linear(member) or member.variation or member.signature.input_map.follows:
         return None
     signature = member.signature
     delayed, direct = signature.input_map.regressors(signature.input_labels)

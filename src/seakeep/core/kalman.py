@@ -16,7 +16,7 @@ from seakeep.arrays import TINY, BoolArray, FloatArray
 
 
 class DelayFilter:
-    """Covariance and gains of the filter.
+    """Covariance and gains of the filter, in place: nothing grows from step to step.
 
     Parameters
     ----------
@@ -35,7 +35,8 @@ class DelayFilter:
 
     def __init__(self, a: FloatArray, process: FloatArray, noise: FloatArray) -> None:
         self.a, self.process, self.noise = a, process, noise
-        self.covariance = np.zeros((a.shape[1], a.shape[1]))
+        size = a.shape[1]
+        self.covariance, self._next = np.zeros((2, size, size))
 
     def shift(self, newest: FloatArray | None = None) -> None:
         """One step in time.
@@ -43,26 +44,35 @@ class DelayFilter:
         `newest`, shape (N, N), is the covariance of the new sample where it does not depend on
         those before; by default the model predicts it.
         """
-        count, before = len(self.a), self.covariance
-        across = np.zeros((count, len(before) - count))
+        before, after = self.covariance, self._next
+        count, size = self.a.shape
+        older = size - count
+        after[:older, :older] = before[count:, count:]
         if newest is None:
             top = self.a @ before
-            across, newest = top[:, count:], top @ self.a.T + self.process
-        # Exactly symmetric: an antisymmetric error of rounding would grow.
-        block = 0.5 * (newest + newest.T)
-        self.covariance = np.block([[before[count:, count:], across.T], [across, block]])
+            after[older:, :older] = top[:, count:]
+            # Exactly symmetric: an antisymmetric error of rounding would grow.
+            block = top @ self.a.T + self.process
+            after[older:, older:] = 0.5 * (block + block.T)
+        else:
+            after[older:, :older] = 0.0
+            after[older:, older:] = newest
+        after[:older, older:] = after[older:, :older].T
+        self.covariance, self._next = after, before
 
     def limit(self, variances: FloatArray, *, exactly: bool = False) -> None:
         """Scale the newest sample's errors down to variances of shape (N,), or `exactly` to them.
 
         Correlations stay as they are.
         """
-        newest = slice(-len(variances), None)
+        newest = slice(len(self.covariance) - len(variances), None)
         variance = np.diagonal(self.covariance)[newest]
         factor = np.sqrt(variances / np.maximum(variance, TINY))
-        scale = np.ones(len(self.covariance))
-        scale[newest] = factor if exactly else np.minimum(factor, 1.0)
-        self.covariance *= np.outer(scale, scale)
+        if not exactly:
+            factor = np.minimum(factor, 1.0)
+        rows = self.covariance[newest] * factor[:, None]
+        rows[:, newest] = self.covariance[newest, newest] * np.outer(factor, factor)
+        self.covariance[newest], self.covariance[:, newest] = rows, rows.T  # exactly symmetric
 
     def measure(self, seen: BoolArray) -> FloatArray:
         """Update by the rows that were measured.

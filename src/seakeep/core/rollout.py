@@ -99,7 +99,8 @@ def rollout(
             f"A of shape {a.shape} does not belong to {count} states: its columns must be a "
             "multiple of N, and its rows N or all of them."
         )
-    if (len(start), math.prod(start.shape[1:])) != (len(driving), size):
+    fits = start.ndim == 2 or start.shape[2] == count
+    if not fits or (len(start), math.prod(start.shape[1:])) != (len(driving), size):
         raise RequestError(
             f"histories {start.shape} and inputs {driving.shape} do not fit A {a.shape}: "
             f"a history has {size} values, and both have one row per window."
@@ -115,9 +116,7 @@ def rollout(
             f"direct inputs of shape {beside.shape} do not stand beside {len(start)} window(s) "
             f"of {steps} steps: one row per window and step is needed."
         )
-    return (
-        rollouts(a, b, [(start, driving, beside)])[0] if len(start) else np.empty((0, steps, count))
-    )
+    return rollouts(a, b, [(start, driving, beside)])[0]
 
 
 def rollouts(
@@ -149,8 +148,12 @@ def rollouts(
     with undefined():  # a free run may overflow: it is cut off where it does
         propagator = _propagator(a, matrices, count, channels, windows, longest)
         for histories, *series in batches:
+            steps = series[1].shape[1]
+            if not len(histories):
+                out.append(np.empty((0, steps, count)))
+                continue
             start = histories[:, ::-1].reshape(len(histories), a.shape[1])
-            values = _run(propagator, start, tuple(series[: len(matrices)]), series[1].shape[1])
+            values = _run(propagator, start, tuple(series[: len(matrices)]), steps)
             finite = np.isfinite(values)
             if not finite.all():
                 gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)

@@ -23,6 +23,7 @@ from collections.abc import (
     Sequence,
 )
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -542,7 +543,7 @@ class _Trials:
         problem = next(iter(self.problems.values()))
         folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
         keys = {
-            (fold, each): json.dumps([each.to_json(), fold, [*own]], sort_keys=True)
+            (fold, each): _key(each, fold, own)
             for fold, (each, own) in itertools.product(folds, levels.items())
         }
         batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
@@ -583,12 +584,10 @@ class _Trials:
 
     def is_near(self, rival: HankelSettings, taken: HankelSettings) -> bool:
         """Whether a kind that is slow to fit comes near the taken one on the first fold."""
-        problem = self.problem(rival)
+        problem, levels = self.problem(rival), self.levels(rival)
         fold = problem.folds()[0]
-        try:
-            scores, weights = problem.judge([(rival, self.levels(rival))], fold)[0]
-        except (RequestError, DataError):  # the runs are too short for it
-            return False
+        scores, weights = problem.judge([(rival, levels)], fold)[0]
+        self.known[_key(rival, fold, levels)] = [scores.tolist(), weights.tolist()]
         others = self.made[taken].by_group()[problem.groups.index(problem.groups[fold])]
         return bool(np.min(scores @ weights) <= NEAR * others)
 
@@ -600,6 +599,11 @@ class _Trials:
         return "".join(
             f"; without {named(o)} {self.made[less].best:.3f}" for o, less in without.items()
         )
+
+
+def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
+    """What scores of a candidate are known by."""
+    return json.dumps([candidate.to_json(), fold, [*levels]], sort_keys=True)
 
 
 def _judged(problems: Mapping[Columns, Problem], batch: tuple[Alike, Tried]) -> list[Scores]:
@@ -902,23 +906,29 @@ def _rivalled(
     plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
     before = {*made}
     rivals = [each.having(**plain) for each in kinds if search.given[2]]
-    if not is_varied:
-        rivals = [each for each in rivals if each.has_path or both.is_near(each, taken)]
-    both.judge(rivals)
+    slow = [each for each in rivals if not (is_varied or each.has_path)]
+    both.judge(each for each in rivals if each not in slow)
+    for rival in slow:
+        with suppress(RequestError, DataError):  # a run is too short for it
+            if both.is_near(rival, taken):
+                both.judge([rival])
     others = [each for each in made if each not in before]
     for other in sorted(others, key=lambda each: made[each].best):
         if made[taken].is_as_good_as(made[other]):
             continue
         both.refine([other])
         own_level = made[other].level(alike)
-        if not trials.problem(other).grows(other, own_level):
-            score = made[other].at(own_level)
-            words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
-            if is_varied:
-                taken, level = other, own_level
-            elif other.has_path:  # subspace models run on no host
-                trials.rival = other.having(ridge=own_level)
-            break
+        if trials.problem(other).grows(other, own_level):
+            continue
+        score = made[other].at(own_level)
+        words += f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
+        if is_varied:
+            taken, level = other, own_level
+        elif other.has_path:
+            trials.rival = other.having(ridge=own_level)
+        else:  # named alone: subspace models run on no host
+            continue
+        break
     return taken, level, words
 
 

@@ -38,9 +38,9 @@ CYCLES = 5.0
 class Validity(IntFlag):
     """What lies outside the training; 0 where nothing does.
 
-    Period, height and steepness are those of waves, mean is that of an input, and surge that of
-    the surge. In service consistency is that of errors of late, and lost says that waves a forecast
-    reads were filled for long.
+    Period, height and steepness are those of waves, mean is that of an input (or a value of its
+    plan, beyond all of training), and surge that of the surge. In service consistency is that of
+    errors of late, and lost says that waves a forecast reads were filled for long.
     """
 
     PERIOD = 1

@@ -228,15 +228,20 @@ def close_gaps(record: FloatArray, lost: BoolArray, longest: int) -> None:
     longest : int
         Samples of a gap at most.
     """
-    known = np.flatnonzero(~lost)
-    for at in np.flatnonzero((np.diff(known) > 1) & (np.diff(known) <= longest + 1)):
-        near = known[max(at - 1, 0) : at + 3]  # one may lack at either end of the record
-        rows, closed = np.arange(known[at] + 1, known[at + 1]), 0.0
-        for own in near:  # Lagrange's polynomials
-            others = near[near != own]
-            weight = ((rows[:, None] - others) / (own - others)).prod(axis=1)
-            closed = closed + record[own] * weight
-        record[rows], lost[rows] = closed, False
+    known, rows = np.flatnonzero(~lost), np.flatnonzero(lost)
+    after = np.searchsorted(known, rows)
+    rows, after = (each[(after > 0) & (after < known.size)] for each in (rows, after))
+    is_short = known[after] - known[after - 1] <= longest + 1
+    rows, places = rows[is_short, None], after[is_short, None] + np.arange(-2, 2)
+    there = (places >= 0) & (places < known.size)  # one may lack at either end of the record
+    near = known[np.clip(places, 0, known.size - 1)]
+    weights = np.where(there, record[near], 0.0)
+    for own in range(4):  # Lagrange's polynomials
+        others = there & there[:, own : own + 1] & (np.arange(4) != own)
+        apart = np.where(others, near[:, own : own + 1] - near, 1)
+        weights[:, own] *= np.where(others, (rows - near) / apart, 1.0).prod(axis=1)
+    record[rows[:, 0]] = weights.sum(axis=1)
+    lost[rows] = False
 
 
 def fill_future(
