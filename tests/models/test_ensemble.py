@@ -12,10 +12,9 @@ from said import data_error, warned
 from scipy import stats
 
 import seakeep
-from seakeep import BayesianHankelDMDc, HankelDMDc, LogUniform, Uniform
+from seakeep import HankelDMDc, LogUniform, Uniform
 from seakeep.models import engine, forecasts
 from seakeep.models.draws import child
-from seakeep.toml import Length
 
 PERIOD, DT = 1.6, 0.1  # 16 samples per period
 
@@ -245,11 +244,3 @@ def test_draws_are_quantiles_of_any_distribution_of_scipy(run):
         quantiles = child(np.random.SeedSequence(3), member).random(4)
         assert float(draws.window[member]) == prior.ppf(quantiles[0])
         assert float(draws.ridge[member]) == stats.gamma(2.0).ppf(quantiles[3])
-
-
-def test_the_recommended_preset():
-    """That of the paper: `tests/study/test_presets.py`."""
-    ours = BayesianHankelDMDc.recommended(encounter_period=1.64, n_members=5)
-    assert (ours.window, ours.delay_rows) == (None, "exact")
-    assert (ours.ridge, ours.lead, ours.alignment.surge) == ("rollout", Length(0.75), "predicted")
-    assert [ours.input_delays.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]

@@ -41,6 +41,7 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what():
 def test_an_ensemble_draws_around_what_was_chosen():
     single = SPEC.fit(runs(), STATES, INPUTS)
     spec = BayesianHankelDMDc.recommended(T, n_members=8)
+    assert [spec.input_delays.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]
     ensemble = replace(spec, select=SHORT).fit(runs(), STATES, INPUTS)
     assert ensemble.settings.observables == single.settings.observables
     assert ensemble.selection == single.selection
