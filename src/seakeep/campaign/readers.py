@@ -154,7 +154,7 @@ def from_midnight(table: Columns, options: FileSettings, day: float = 0.0) -> fl
     """Let serial days count from a day, or else the midnight before the first; return that day."""
     name, values = time_column(table, options.time), table.values
     unit = time_unit_of(table, name or "", options.time_unit)
-    if name in values and same_unit(unit, "d") and values[name][0] > 1e4:
+    if name in values and same_unit(unit, "d") and values[name].size and values[name][0] > 1e4:
         days = values[name] % DATENUM
         day = day or float(days[0] // 1)
         values[name] = np.round(DAY * (days - day), 6) / DAY

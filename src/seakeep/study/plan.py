@@ -392,7 +392,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
     wanted = list(dict.fromkeys(training_names) | asked)
     runs = load_prepared(campaign, names=wanted, progress=progress)
     for name, run in runs.items():
-        sound_matrix(run, [*study.states, *study.inputs], name)
+        sound_matrix(run, [*study.states, *study.inputs], f"run '{name}'")
     shared, dt = next(iter(runs.values())).attrs, step_of(runs)
     # Prepared runs hold the period where their preparation counts in it.
     period = general.encounter_period or shared.get("encounter_period")

@@ -118,6 +118,7 @@ def run_study(
     folder = UnitFolder(out, study.digest)
     before = folder.check()
     with folder.alone():
+        before = before or folder.check()
         labels = _labels(study)
         if before is not None:
             report(1, 1, "finished before")

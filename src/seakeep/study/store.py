@@ -110,8 +110,9 @@ class UnitFolder:
             return None
         if not started:
             raise RequestError(
-                f"{self.folder} holds results, and none of them says of which study. Choose "
-                "another folder (-o), or remove this one."
+                f"{self.folder} holds results, and none of them says of which study: they are "
+                "damaged, or of another format of seakeep. Choose another folder (-o), or "
+                "remove this one."
             )
         if started["digest"] != self.digest:
             raise RequestError(
