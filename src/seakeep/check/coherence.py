@@ -103,7 +103,7 @@ def coherence(
     elif plain := linear_part(model):
         bounding = [free_runs(plain, waves, like=own)]
     # Baselines take the observables of the model: then they bound no linear map.
-    references = [*bounding, *others, own]
+    references = [*bounding, *others, *([] if linear else [own])]
     bounding += [] if names else others
     pieces = []
     for name, part in parts.items():
