@@ -285,6 +285,9 @@ CHANGES = {
         ("float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
         ("wanted = np.zeros(len(values), dtype=bool)", "wanted = np.ones(len(values), dtype=bool)", "models/test_alignment.py::test_elevations_are_carried_where_a_span_reads_them_alone"),
         ("offset + (trained - here)", "offset + (here - trained)", "models/test_alignment.py::test_a_probe_that_was_moved_and_says_so_changes_nothing"),
+        ("back=round(BACK * period)", "back=round(0.5 * BACK * period)", "models/test_following.py::test_settings_know_the_history_that_carriers_read"),
+        ("np.tile([0, 1, 2], len(places))", "np.tile([2, 1, 0], len(places))", "models/test_readouts.py::test_the_wave_at_the_line_is_that_of_the_tank"),
+        ("enumerate(at) if each <= place]", "enumerate(at)]", "models/test_live.py::test_a_dead_probe_is_filled_by_no_more_than_waves"),
     ],
     "models/baselines.py": [
         ("not np.isfinite(given).all()", "False", "test_doors.py::test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it"),
@@ -341,21 +344,12 @@ CHANGES = {
         ("b = b_hat * scale_x[:, None] / scale_u", "b = b_hat / scale_u", "oracles/test_hankel_oracles.py::test_scipy_simulates_the_exported_system_like_our_forecast"),
         ("lead - (term.order > 0)", "lead", "hosts/test_mat.py::test_a_mat_file_with_observables_computes_the_forecast"),
     ],
-    "models/following.py": [
-        ("back=round(BACK * period)", "back=round(0.5 * BACK * period)", "models/test_following.py::test_settings_know_the_history_that_carriers_read"),
-        ("np.tile([0, 1, 2], len(places))", "np.tile([2, 1, 0], len(places))", "models/test_readouts.py::test_the_wave_at_the_line_is_that_of_the_tank"),
-        ("enumerate(at) if each <= place]", "enumerate(at)]", "models/test_live.py::test_a_dead_probe_is_filled_by_no_more_than_waves"),
-    ],
     "models/forecasts.py": [
         ("np.stack([states[at + 1 : at + 1 + steps] for at in starts])", "np.stack([states[at : at + steps] for at in starts])", "check/test_residuals.py::test_a_right_model_leaves_white_errors"),
         ('"diverged_at": lost, ', "", "models/test_stability.py::test_a_forecast_that_diverges_ends_in_nan_with_its_status"),
         ("first = max(len(after) - signature.lead_samples + 1, 0)", "first = 0", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),
-    ],
-    "models/growth.py": [
         ("scale.centre + windows.zero[number]", "scale.centre", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
         ("if windows.departures and model.errors is not None:", "if False:", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
-        ("return (n + p) / (n - p)", "return 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
-        ("self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
         ("middle.var(axis=0, ddof=1)", "middle.var(axis=0, ddof=0)", "models/test_ensemble.py::test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays"),
         ("np.mean(apart**2, axis=0), axis=-2)[..., late:, :]", "np.mean(apart**2, axis=0)[..., late:, :], axis=-2)", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("apart = 0.5 * np.abs(plus - minus)", "apart = np.abs(plus - minus)", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
@@ -368,10 +362,14 @@ CHANGES = {
         ("np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)", "np.clip(trust, 0.0, 1.0)", "models/test_ahead.py::test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises"),
         ("whole |= not whole.any()", "pass", "models/test_ahead.py::test_a_run_that_is_lost_at_last_is_weighed_before"),
         ("np.nan_to_num((high - claimed) / (high - low), nan=0.0)", "(high - claimed) / (high - low)", "models/test_ahead.py::test_a_run_that_is_lost_at_last_is_weighed_before"),
-        ("np.maximum.accumulate(reached)", "np.array(reached)[: len(parts[0].rms)]", "models/test_ahead.py::test_errors_of_several_models_are_known_as_far_as_those_of_any"),
         ("own.part(at), steps < first, ", "own.part(at), steps < 0, ", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),
         ("np.where(known, mean, shrunk)", "shrunk", "models/test_ahead.py::test_where_waves_are_known_nothing_is_weighed"),
         ("errors.of_forecast(windows.steps)", "0 * errors.of_forecast(windows.steps)", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
+    ],
+    "models/growth.py": [
+        ("return (n + p) / (n - p)", "return 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
+        ("self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
+        ("np.maximum.accumulate(reached)", "np.array(reached)[: len(parts[0].rms)]", "models/test_ahead.py::test_errors_of_several_models_are_known_as_far_as_those_of_any"),
     ],
     "models/inputs.py": [
         ("squared = (here - place.centre) ** 2", "squared = here**2", "models/test_following.py::test_training_is_the_recursion_on_the_measured_surge"),

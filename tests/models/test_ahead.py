@@ -12,7 +12,8 @@ from records import table
 from seakeep import HankelDMDc
 from seakeep.baselines import Subspace
 from seakeep.models.engine import Windows
-from seakeep.models.growth import LeadErrors, weigh_members, weighed
+from seakeep.models.forecasts import weigh_members, weighed
+from seakeep.models.growth import LeadErrors
 from seakeep.models.inputs import Scale
 from seakeep.signals.prediction import foresee
 

@@ -15,7 +15,7 @@ from seakeep.files import MARK, check_output, make_folder, templates, version, w
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model, validity
 from seakeep.models.engine import GROWTH, fading
-from seakeep.models.growth import DOUBTED
+from seakeep.models.forecasts import DOUBTED
 from seakeep.models.live import AFTER, Live
 from seakeep.models.terms import SlowSquare, Term
 from seakeep.signals import prediction

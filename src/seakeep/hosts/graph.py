@@ -12,7 +12,7 @@ from seakeep.errors import needing
 from seakeep.files import MARK, check_output, replacing, version
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
-from seakeep.models.following import Following
+from seakeep.models.alignment import Following
 from seakeep.models.inputs import Signature
 from seakeep.models.observables import Observed
 from seakeep.models.terms import SlowSquare, Term

@@ -18,8 +18,8 @@ from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
 from seakeep.models.engine import Windows, open_runs
-from seakeep.models.forecasts import Model, counted
-from seakeep.models.growth import LeadErrors, lead_errors, stretches_of, weighed_runs
+from seakeep.models.forecasts import Model, counted, weighed_runs
+from seakeep.models.growth import LeadErrors, lead_errors, stretches_of
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel

@@ -10,8 +10,7 @@ from typing import Any
 from seakeep.arrays import Datasets
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
-from seakeep.models.alignment import FittedAlignment, ProbeAlignment
-from seakeep.models.following import LEAD
+from seakeep.models.alignment import LEAD, FittedAlignment, ProbeAlignment
 from seakeep.models.observables import Powers, SlowSquares
 from seakeep.models.settings import HankelSettings
 from seakeep.models.terms import Observable

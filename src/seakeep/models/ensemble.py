@@ -37,10 +37,11 @@ from seakeep.models.forecasts import (
     reduce_members,
     statistic_coordinate,
     statuses,
+    weigh_members,
     windows_dataset,
     with_units,
 )
-from seakeep.models.growth import LeadErrors, Stretch, linear_errors, weigh_members
+from seakeep.models.growth import LeadErrors, Stretch, linear_errors
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel

@@ -1,19 +1,19 @@
-"""Growth of errors in training with the time after a start, and forecasts that it weighs."""
+"""Growth of errors in training with the time after a start."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, ratio
+from seakeep.arrays import Datasets, FloatArray, ratio
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
-from seakeep.models.inputs import Scale, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.training import TrainingData
 
@@ -25,10 +25,6 @@ REACH = 3
 """Longest delays of the model that the free runs last."""
 LEAST = 64
 """Steps that they last at least: errors of a lightly damped vessel outgrow short delays."""
-DOUBTED = 0.5, 0.9
-"""Squares of errors, claimed, over the variance of training between which a forecast from waves
-that are predicted passes over to the mean: on the virtual tank its best weight is 0.7 to 0.9 at
-0.55, 0.2 to 0.5 at 0.75 and 0 to 0.1 at 0.95, by one probe and by two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,108 +232,3 @@ def stretches_of(data: TrainingData, signature: Signature, runs: Datasets) -> li
             first = max(first, signature.history_samples - 1 - skipped)
         stretches.append(Stretch(*own, first, window.last, source, data.zero(number)))
     return stretches
-
-
-def weighed_runs(
-    model: Any, run: Callable[[Sequence[Windows]], list[FloatArray]], groups: Sequence[Windows]
-) -> list[FloatArray]:
-    """Free runs of a single model over groups of windows, weighed where waves are predicted."""
-    runs = run(groups)
-    for values, windows in zip(runs, groups, strict=True):
-        if windows.departures and model.errors is not None:
-            parts = [values, *run(windows.departures)]
-            weigh_members(windows, parts, model.errors, model.signature.state_scale)
-    return runs
-
-
-def weighed(
-    runs: FloatArray,
-    errors: FloatArray | float,
-    scale: Scale,
-    given: BoolArray,
-    before: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean of runs that passes over to that of training as the claimed error nears the SD there.
-
-    Where a state lies farther than the SD to one side of that mean all through the history, as the
-    mean surge of another sea does, the mean errs by more: by what the forecast departs, too.
-
-    Parameters
-    ----------
-    runs : ndarray, shape (member, 1 + 2 departures, …, steps, N)
-        Runs from the inputs that are expected, then from departures from them and from their
-        opposites. Innovations of later samples do the same later, so that effects add up over the
-        leads: what squares of waves move the mean by, and the variance. Inputs may depart by the
-        same waves, so that effects of one innovation of each count with one sign. Steps before
-        those of `given` only add up.
-    errors : ndarray, shape (steps, N)
-        Mean squares of the model's errors.
-    scale : Scale
-        Moments of training.
-    given : ndarray of bool, shape (…, steps)
-        Whether the waves that a step reads are known: nothing changes there.
-    before : ndarray, shape (N,)
-        The :func:`departure` of the history.
-
-    Returns
-    -------
-    mean, spread, weight : ndarray, shape (…, steps, N)
-        The mean; the variance over members and waves, before it is weighed; and the weight of the
-        forecast against the mean of training.
-    """
-    late = runs.shape[-2] - given.shape[-1]
-    middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
-    apart = 0.5 * np.abs(plus - minus).sum(axis=1)
-    moved = (0.5 * (plus + minus) - middle[:, None]).sum(axis=1)
-    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=-2)[..., late:, :]
-    away = np.nan_to_num(np.cumsum(moved.mean(axis=0), axis=-2))[..., late:, :]
-    middle = middle[..., late:, :]
-    if len(middle) > 1:
-        spread += middle.var(axis=0, ddof=1)
-    low, high = DOUBTED
-    known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre
-    # A state that never moved is as it is.
-    usual = np.fmax(np.fmin(np.abs(mean - centre), before), scale.spread)
-    claimed = (spread + errors) / np.maximum(usual**2, TINY)
-    # Where a departure is lost, nothing of the forecast is trusted.
-    trust = np.nan_to_num((high - claimed) / (high - low), nan=0.0)
-    lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
-    shrunk = centre + lasting * (mean + away - centre)
-    return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
-
-
-def departure(history: FloatArray, scale: Scale) -> FloatArray:
-    """How far all of a history lies to one side of the mean of training, shape (N,)."""
-    away = history - scale.centre
-    return np.maximum(away.min(axis=0), -away.max(axis=0))
-
-
-def weigh_members(
-    windows: Windows, parts: Sequence[FloatArray], errors: LeadErrors, scale: Scale
-) -> None:
-    """Weigh members in place where windows read predicted inputs, and keep their spread.
-
-    Parameters
-    ----------
-    windows : Windows
-        With their departures.
-    parts : sequence of ndarray, each of shape (member, window, steps, N)
-        Runs over the windows, which are changed, and over the departures. A member that is lost in
-        a window does not count there, unless all are.
-    errors : LeadErrors
-        Errors of the members' mean.
-    scale : Scale
-        Moments of training.
-    """
-    steps, squares = np.arange(windows.steps), errors.of_forecast(windows.steps)
-    for number, first in enumerate(windows.predicted):
-        whole = np.isfinite(parts[0][:, number]).all(axis=(1, 2))
-        whole |= not whole.any()
-        own, before = scale, departure(windows.histories[number], scale)
-        if windows.zero is not None:
-            own = replace(scale, centre=scale.centre + windows.zero[number])
-        for column in range(squares.shape[1] if first >= 0 else 0):  # one by one, for memory
-            at = slice(column, column + 1)
-            runs = np.stack([each[whole, number, :, at] for each in parts], axis=1)
-            mean, *_ = weighed(runs, squares[:, at], own.part(at), steps < first, before[at])
-            parts[0][:, number, :, at] += mean - runs[:, 0].mean(axis=0)

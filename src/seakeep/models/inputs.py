@@ -2,9 +2,7 @@
 
 A map is fitted with a model and opened once per run: its :class:`Drive` then serves all members,
 windows and steps. It aligns the elevations to the vessel, reads them ahead, and puts observables
-beside them. The elevation is carried to a vessel whose position is measured as whole records
-(:mod:`seakeep.models.alignment`), or step by step to where the model itself says that it is
-(:mod:`seakeep.models.following`).
+beside them.
 """
 
 from __future__ import annotations
@@ -20,8 +18,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.core.recursion import carried, read_table
 from seakeep.errors import RequestError
-from seakeep.models.alignment import FittedAlignment
-from seakeep.models.following import SQUARED, Bank, Following
+from seakeep.models.alignment import SQUARED, Bank, FittedAlignment, Following
 from seakeep.models.labelled import ChannelLabel, Span
 from seakeep.models.observables import NOTHING, Observed
 from seakeep.models.readouts import FittedReadOut

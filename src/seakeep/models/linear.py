@@ -17,8 +17,8 @@ from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
 from seakeep.models.engine import Dynamics, Windows, linear_runs
-from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name
-from seakeep.models.growth import LeadErrors, linear_errors, stretches_of, weighed_runs
+from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name, weighed_runs
+from seakeep.models.growth import LeadErrors, linear_errors, stretches_of
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live

@@ -46,8 +46,14 @@ from seakeep.executor import one_blas_thread
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Runs
-from seakeep.models.forecasts import label_channels, rows_by_name, statistic_coordinate
-from seakeep.models.growth import WINDOWS, LeadErrors, departure, weighed
+from seakeep.models.forecasts import (
+    departure,
+    label_channels,
+    rows_by_name,
+    statistic_coordinate,
+    weighed,
+)
+from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.validity import Conditions, Coverage, Validity

@@ -11,7 +11,7 @@ from seakeep.arrays import Datasets, FloatArray, IntArray
 from seakeep.core.readouts import KNOTS, MARGIN, LoadMap, best_place, floor_of, sums, weights_of
 from seakeep.errors import RequestError
 from seakeep.models import labelled
-from seakeep.models.following import PER_WAVE
+from seakeep.models.alignment import PER_WAVE
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOutKind, motions_of
 from seakeep.models.training import TrainingData
 

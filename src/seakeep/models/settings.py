@@ -23,8 +23,7 @@ from seakeep.arrays import (
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, quiet, warn
 from seakeep.models import labelled, store
-from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.following import BACK, Following
+from seakeep.models.alignment import BACK, Following, ProbeAlignment
 from seakeep.models.inputs import InputMap
 from seakeep.models.observables import Observed, observables_of
 from seakeep.models.priors import Prior, prior_json
