@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tank_figures import comparison, realise
 
-from seakeep.core.metrics import slack_share
+from seakeep.metrics import slack_share
 from seakeep.signals.waves import noise_floor
 from seakeep.tank.play import play_run, truth
 

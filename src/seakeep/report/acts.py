@@ -11,8 +11,8 @@ import xarray as xr
 from scipy.stats import binomtest
 
 from seakeep.arrays import FloatArray, Progress, undefined
-from seakeep.core.metrics import slack_share
 from seakeep.core.spectra import split_bands
+from seakeep.metrics import slack_share
 from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables

@@ -24,8 +24,8 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in, whole_span
 from seakeep.conventions import displayed, froude_factor, is_elevation
 from seakeep.core.bootstrap import FEWEST_SAMPLES
-from seakeep.core.metrics import root_mean_square
 from seakeep.errors import DataError, RequestError, warn
+from seakeep.metrics import root_mean_square
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text

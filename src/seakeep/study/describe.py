@@ -10,8 +10,8 @@ from seakeep.campaign import Campaign
 from seakeep.check.parts import is_regular, whole_span
 from seakeep.conventions import is_elevation
 from seakeep.core.harmonics import dominant_frequency
-from seakeep.core.metrics import slack_share
 from seakeep.errors import RequestError
+from seakeep.metrics import slack_share
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat

@@ -21,10 +21,10 @@ from seakeep import statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.density import NUMBERS, jsd_intervals
-from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, SeakeepError, quiet, warn
 from seakeep.executor import in_order
+from seakeep.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
 
