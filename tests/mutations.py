@@ -553,10 +553,6 @@ CHANGES = {
         ("offset=float(np.mean(difference))", "offset=-float(np.mean(difference))", "signals/test_tracking.py::test_a_lag_one_wave_period_off_is_told"),
         ("np.clip(0.5 * (before - after) / bend", "np.clip(0.5 * (after - before) / bend", "signals/test_celerity.py::test_a_peak_between_samples"),
     ],
-    "signals/panel.py": [
-        ("np.arctan2(2 * xy, xx - yy)", "np.arctan2(xy, xx - yy)", "signals/test_tracking.py::test_motions_of_the_centre_of_gravity"),
-        ("np.sqrt(12 * (mean + sign * half))", "np.sqrt(6 * (mean + sign * half))", "signals/test_tracking.py::test_motions_of_the_centre_of_gravity"),
-    ],
     "signals/prediction.py": [
         ("away = np.abs(6.0 / (a * b * c) * away)", "away = np.abs(away)", "signals/test_prediction.py::test_a_jump_is_far_above_third_differences_of_late_and_is_taken_where_it_stays"),
         ("beside = ((c == 3) | jumps) & ", "beside = ", "signals/test_prediction.py::test_a_jump_is_far_above_third_differences_of_late_and_is_taken_where_it_stays"),
@@ -598,6 +594,8 @@ CHANGES = {
         ("steps[steps < 1.5 * np.median(steps)].mean()", "np.median(steps)", "signals/test_time_axis.py::test_rounding_of_times_does_not_add_up_over_a_long_gap"),
     ],
     "signals/tracking.py": [
+        ("np.arctan2(2 * xy, xx - yy)", "np.arctan2(xy, xx - yy)", "signals/test_tracking.py::test_motions_of_the_centre_of_gravity"),
+        ("np.sqrt(12 * (mean + sign * half))", "np.sqrt(6 * (mean + sign * half))", "signals/test_tracking.py::test_motions_of_the_centre_of_gravity"),
         ('pitch = side * seen["panel_angle"]', 'pitch = seen["panel_angle"]', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
     ],
     "signals/waves.py": [

@@ -330,7 +330,7 @@ def tank():
     sys.path.insert(0, str(ROOT / "benchmarks"))
     from tank_figures import hydrodynamics_figure, realise, run_figure, tank_spectrum_figure
 
-    from seakeep.signals.panel import opencv
+    from seakeep.signals.tracking import opencv
     from seakeep.tank.delivery import side_view
     from seakeep.tank.play import check_settings, play_run, truth
     from seakeep.tank.settings import default_settings

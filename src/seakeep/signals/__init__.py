@@ -20,7 +20,6 @@ from seakeep.signals.lags import (
     correlation_peak,
     windowed_lags,
 )
-from seakeep.signals.panel import TrackingSettings
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.propagation import (
     carry_by_celerity,
@@ -50,7 +49,7 @@ from seakeep.signals.time_axis import (
     onto_uniform,
     uniform_step,
 )
-from seakeep.signals.tracking import Track, contact_sheet, track_video
+from seakeep.signals.tracking import Track, TrackingSettings, contact_sheet, track_video
 from seakeep.signals.waves import (
     encounter_period,
     find_leakage,

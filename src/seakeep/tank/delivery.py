@@ -20,7 +20,7 @@ from numpy.random import Generator
 from seakeep.arrays import ArrayLike, FloatArray
 from seakeep.errors import SeakeepError
 from seakeep.files import MARK, write_netcdf, write_text
-from seakeep.signals.panel import Image, opencv
+from seakeep.signals.tracking import Image, opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import TankSettings
 from seakeep.toml import rendered

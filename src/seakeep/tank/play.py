@@ -14,7 +14,7 @@ from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean, naming
 from seakeep.executor import in_order
 from seakeep.files import MARK, check_output, is_there, make_folder, write_netcdf, write_text
-from seakeep.signals.panel import opencv
+from seakeep.signals.tracking import opencv
 from seakeep.tank.delivery import (
     CAMPAIGN,
     FIRST_LINE,
