@@ -538,11 +538,6 @@ CHANGES = {
         ("left *= 1.0 - reflection**2", "left *= 1.0", "signals/test_prediction.py::test_the_power_of_innovations_is_that_of_a_known_process"),
         ("left * (series.size + order) / (series.size - order)", "left", "signals/test_prediction.py::test_departures_of_a_sea_are_the_errors_of_its_prediction"),
     ],
-    "signals/carriers.py": [
-        ("amplitude = np.sqrt(power)", "amplitude = power", "signals/test_carriers.py::test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design"),
-        ("np.outer(place, k) - np.outer(instant, omega)", "np.outer(place, k) + np.outer(instant, omega)", "signals/test_carriers.py::test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design"),
-        ("return free + ones * (1.0 - free.sum()) / ones.sum()", "return free", "signals/test_carriers.py::test_the_position_follows_a_slow_oscillation_and_holds_at_rest"),
-    ],
     "signals/filters.py": [
         ("0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)", "0.5", "signals/test_time_axis.py::test_what_would_alias_is_removed"),
         ("sum(edges) / 2, window", "edges[1], window", "signals/test_filters.py::test_gains_of_the_taps"),
@@ -565,6 +560,9 @@ CHANGES = {
         ("scipy.signal.lfilter([1.0], whitening, first)", "scipy.signal.lfilter(whitening, [1.0], first)", "signals/test_prediction.py::test_the_power_of_innovations_is_that_of_a_known_process"),
     ],
     "signals/propagation.py": [
+        ("amplitude = np.sqrt(power)", "amplitude = power", "signals/test_carriers.py::test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design"),
+        ("np.outer(place, k) - np.outer(instant, omega)", "np.outer(place, k) + np.outer(instant, omega)", "signals/test_carriers.py::test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design"),
+        ("return free + ones * (1.0 - free.sum()) / ones.sum()", "return free", "signals/test_carriers.py::test_the_position_follows_a_slow_oscillation_and_holds_at_rest"),
         ("centre + 0.5 * cycle)", "centre + 1.5 * cycle)", "signals/test_celerity.py::test_the_bound_keeps_the_peak_of_the_next_period_out"),
         ("scaled = np.clip(place / half, -1.0, 1.0)", "scaled = place / half", "signals/test_propagation.py::test_a_place_outside_the_range_is_taken_to_its_end"),
         ("spectrum * np.exp(-1j * k * node)", "spectrum * np.exp(1j * k * node)", "signals/test_propagation.py::test_an_irregular_sea_is_carried_by_dispersion"),

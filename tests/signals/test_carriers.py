@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from seas import sea
 
 from seakeep.core.recursion import carried
-from seakeep.signals.carriers import carriers, mean_spectrum, position_taps, slow_position
+from seakeep.signals.propagation import carriers, mean_spectrum, position_taps, slow_position
 
 DT, PERIOD, DEPTH = 0.05, 1.6, 3.6  # s, s, m
 TIME = DT * np.arange(4000)

@@ -63,7 +63,7 @@ def carried(taps: FloatArray, record: FloatArray) -> FloatArray:
     Parameters
     ----------
     taps : ndarray, shape (place, probe, taps)
-        Weights of samples about an instant, oldest first (:mod:`seakeep.signals.carriers`).
+        Weights of samples about an instant, oldest first (:mod:`seakeep.signals.propagation`).
     record : ndarray, shape (time, probe)
         Elevations at the probes.
 

@@ -8,9 +8,9 @@ The elevation is carried by
 positive downstream, so that one linear model holds wherever the vessel has drifted to. Records
 are carried whole to a measured surge (:class:`FittedAlignment`), or step by step to where the
 model itself says that the vessel is (:class:`Following`): there a bank of short filters reads each
-elevation at places on a grid about the vessel (:mod:`seakeep.signals.carriers`), and the vessel's
-place is a weighted sum of its last surges, measured ones in training and before a start, predicted
-ones after it (:mod:`seakeep.core.recursion`).
+elevation at places on a grid about the vessel (:mod:`seakeep.signals.propagation`), and the
+vessel's place is a weighted sum of its last surges, measured ones in training and before a start,
+predicted ones after it (:mod:`seakeep.core.recursion`).
 """
 
 from __future__ import annotations
@@ -40,12 +40,14 @@ from seakeep.core.recursion import Place
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel, Span
-from seakeep.signals.carriers import carriers, mean_spectrum, position_taps
 from seakeep.signals.propagation import (
     band_limit,
+    carriers,
     carry_by_celerity,
     carry_by_dispersion,
     effective_celerity,
+    mean_spectrum,
+    position_taps,
 )
 from seakeep.signals.time_axis import stretches
 from seakeep.waves import group_speed, wavenumber
@@ -629,7 +631,7 @@ class Following:
     def _carriers(
         self, rig: Rig, columns: Sequence[int], targets: FloatArray, ahead: int, leads: IntArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Filters of these probes; see :func:`seakeep.signals.carriers.carriers`."""
+        """Filters of these probes; see :func:`seakeep.signals.propagation.carriers`."""
         return carriers(
             np.linspace(*self.band, len(self.power)),
             np.array(self.power),
