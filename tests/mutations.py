@@ -167,10 +167,6 @@ CHANGES = {
         ("row += gram[at - N : at, other.newer]", "row += 0.0 * gram[at - N : at, other.newer]", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
         ("signed[1::2] *= -1.0", "signed[0::2] *= -1.0", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
     ],
-    "core/harmonics.py": [
-        ("[2] - 1j *", "[2] + 1j *", "check/test_response.py::test_intervals_of_a_harmonic_fit_cover_as_they_say"),
-        ("part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)", "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
-    ],
     "core/kalman.py": [
         ("on[:, count:] += reach[:, : size - count]", "on[:, :-count] += reach[:, : size - count]", "core/test_kalman.py::test_errors_of_today_are_carried_as_the_model_carries_them"),
         ("+ np.diag(self.noise[rows])", "+ np.diag(self.noise[rows] ** 0.5)", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
@@ -211,6 +207,8 @@ CHANGES = {
         ("weights = values / (values**2 + ridge)", "weights = values / (values**2 + ridge**2)", "core/test_solve.py::test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen"),
     ],
     "core/spectra.py": [
+        ("[2] - 1j *", "[2] + 1j *", "check/test_response.py::test_intervals_of_a_harmonic_fit_cover_as_they_say"),
+        ("part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)", "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
         ('padtype="even"', 'padtype="odd"', "statistics/test_bands.py::test_waves_are_not_forced_to_nothing_at_the_ends"),
         ("return low, x - low", "return low, x", "statistics/test_bands.py::test_the_parts_add_up_to_the_series"),
         ("1 + 2 * OVERLAP_CORRELATION * (count - 1) / count", "1 + 0 * count", "check/test_coherence.py::test_averages_and_the_interval_of_a_gain_are_those_of_repetitions"),

@@ -13,7 +13,7 @@ from seas import Sea
 
 from seakeep import HankelDMDc, check
 from seakeep.check.parts import reference_probe
-from seakeep.core.harmonics import estimate, harmonic_fits
+from seakeep.core.spectra import estimate, harmonic_fits
 
 DT, DEPTH, PLACES = 0.1, 3.6, {"eta_fwd": -1.5, "eta_cog": 0.0}
 FREQUENCIES = np.array([0.3, 0.5, 0.8, 1.7])

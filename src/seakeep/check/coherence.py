@@ -20,8 +20,7 @@ from seakeep.check.parts import (
     regressors,
     used_parts,
 )
-from seakeep.core.harmonics import dominant_frequency
-from seakeep.core.spectra import Spectra, cross_spectra, segment_length
+from seakeep.core.spectra import Spectra, cross_spectra, dominant_frequency, segment_length
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
 from seakeep.models.labelled import mean_period

@@ -26,9 +26,15 @@ from seakeep.check.parts import (
     wave_turns,
 )
 from seakeep.conventions import is_elevation
-from seakeep.core.harmonics import dominant_frequency, estimate, half_angle, harmonic_fits
 from seakeep.core.response import frequency_response
-from seakeep.core.spectra import cross_spectra, segment_length
+from seakeep.core.spectra import (
+    cross_spectra,
+    dominant_frequency,
+    estimate,
+    half_angle,
+    harmonic_fits,
+    segment_length,
+)
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.engine import Dynamics

@@ -17,7 +17,7 @@ from seakeep.check.parts import (
     used_parts,
     whole_span,
 )
-from seakeep.core.harmonics import dominant_frequency
+from seakeep.core.spectra import dominant_frequency
 from seakeep.errors import DataError
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model, outside_training

@@ -9,7 +9,7 @@ from seakeep.arrays import FloatArray, Groups
 from seakeep.campaign import Campaign
 from seakeep.check.parts import is_regular, whole_span
 from seakeep.conventions import is_elevation
-from seakeep.core.harmonics import dominant_frequency
+from seakeep.core.spectra import dominant_frequency
 from seakeep.errors import RequestError
 from seakeep.metrics import slack_share
 from seakeep.signals import significant_height, wave_spectrum
