@@ -68,10 +68,6 @@ CHANGES = {
         ("if each[1] >= FEWEST} or counted", "} or counted", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
         ("or steady > NOISY * period", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
-    "check/coherence.py": [
-        ("bounding += [] if names else others", "bounding += others", "check/test_coherence.py::test_observables_lower_the_bound"),
-        ("elif plain := linear_part(model):", "elif plain := None:", "check/test_coherence.py::test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel"),
-    ],
     "check/motion.py": [
         ("linear / np.hypot(2 * np.pi, linear)", "linear / (2 * np.pi)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
         ("np.abs(left[:, order] * right[:, order])", "np.abs(right[:, order] * right[:, order])", "check/test_free.py::test_modes_say_which_states_take_part"),
@@ -92,6 +88,8 @@ CHANGES = {
         ("BAND * its_noise", "0 * its_noise", "check/test_peaks.py::test_noise_of_a_sensor_makes_no_peaks"),
     ],
     "check/residuals.py": [
+        ("bounding += [] if names else others", "bounding += others", "check/test_coherence.py::test_observables_lower_the_bound"),
+        ("elif plain := linear_part(model):", "elif plain := None:", "check/test_coherence.py::test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel"),
         ("1.96 / np.sqrt(count)", "1.96 / np.sqrt(count - lags)", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
         ("name, slice(first + 1, last + 1))", "name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ],

@@ -12,11 +12,10 @@ from inspect import signature
 import xarray as xr
 
 from seakeep.arrays import Datasets, Groups, Progress
-from seakeep.check.coherence import coherence
 from seakeep.check.motion import decay, drift, measured_decay, modes
 from seakeep.check.parts import Known, of_part
 from seakeep.check.peaks import statistics
-from seakeep.check.residuals import residuals
+from seakeep.check.residuals import coherence, residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.worth import validity, worth
 from seakeep.errors import SeakeepError, SeakeepWarning, quiet
