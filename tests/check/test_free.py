@@ -10,8 +10,8 @@ from records import record
 from said import data_error, warned
 
 from seakeep import HankelDMDc, check
+from seakeep.check.motion import free_decay
 from seakeep.check.parts import samples_in
-from seakeep.core.extremes import free_decay
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
 

@@ -8,7 +8,7 @@ from records import record
 from seas import sea
 
 from seakeep import HankelDMDc, check
-from seakeep.core.extremes import fit_weibull, most_probable_extreme
+from seakeep.check.peaks import fit_weibull, most_probable_extreme
 from seakeep.study import to_full_scale
 
 

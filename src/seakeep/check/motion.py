@@ -1,6 +1,12 @@
-"""Motion by a model's matrices: its modes, its decay beside the vessel's, and its second order."""
+r"""Motion by a model's matrices: its modes, its decay beside the vessel's, and its second order.
 
-from typing import Any
+A free decay shows period and damping in its successive extremes, and how damping grows with
+amplitude. With :math:`a_k` half the distance between successive extremes, the decrement of a cycle
+is :math:`\delta_k = 2 \ln(a_k / a_{k+1}) = p + q\,\bar a_k`: p is linear damping,
+:math:`\zeta = p / \sqrt{4\pi^2 + p^2}`, and q quadratic (Himeno, 1981; ITTC 7.5-02-07-04.5).
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -22,7 +28,6 @@ from seakeep.check.parts import (
 )
 from seakeep.check.response import points_of, transfer
 from seakeep.conventions import MOTIONS, canonical_channel
-from seakeep.core.extremes import free_decay
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.labelled import Span, channel_matrix, mean_period
@@ -192,6 +197,97 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
     parts = gathered(still, released, "no run in still water is a free decay.", "no decay from")
     names = xr.Variable("run", list(parts))
     return xr.concat([*parts.values()], names, join="outer").drop_vars("cycle")
+
+
+SMALLEST = 0.02
+"""Part of the whole range below which a swing counts as noise."""
+NOISE = 4.0
+"""SDs of noise on either side that thousands of its samples hardly leave."""
+APART = 2.0
+"""Half periods of the largest swing after which the next extreme is another motion's."""
+
+
+class Decay(NamedTuple):
+    """What a decaying oscillation shows; NaN where it has too few extremes.
+
+    Attributes
+    ----------
+    period : float
+        Damped period.
+    damping_ratio : float
+        Of small amplitudes, from p.
+    p, q : float
+        Decrement of a cycle at zero amplitude, and its growth per unit of amplitude.
+    cycles : int
+        Number of decrements.
+    amplitudes, decrements : ndarray, shape (cycles,)
+        Mean amplitude (geometric) and decrement of each.
+    """
+
+    period: float
+    damping_ratio: float
+    p: float
+    q: float
+    cycles: int
+    amplitudes: FloatArray
+    decrements: FloatArray
+
+
+def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> Decay:
+    """Period, p and q of a series that was released; a constant in it does not matter.
+
+    Swings count from the largest on, until one is lost in noise. Extremes are those of parabolas
+    through a third of a half period on either side, which shrink all of them alike; what follows
+    is weighted by amplitude, as noise matters by its inverse.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time,)
+        From the release on.
+    dt : float
+        Time step.
+    noise : float, optional
+        Standard deviation of the noise of its sensor.
+
+    Returns
+    -------
+    Decay
+
+    Examples
+    --------
+    >>> t = np.arange(0, 60, 0.05)
+    >>> found = free_decay(np.exp(-0.05 * t) * np.cos(t), 0.05)
+    >>> round(found.period / (2 * np.pi), 3), round(found.damping_ratio, 3)
+    (1.0, 0.05)
+    """
+    least = max(SMALLEST * np.ptp(series), 2 * NOISE * noise)
+    nothing = Decay(np.nan, np.nan, np.nan, np.nan, 0, np.empty(0), np.empty(0))
+    places = np.sort(
+        np.concatenate(
+            [scipy.signal.find_peaks(sign * series, prominence=least)[0] for sign in (1, -1)]
+        )
+    )
+    if places.size < 3:
+        return nothing
+    places = places[np.argmax(np.abs(np.diff(series[places]))) :]  # other modes die out before
+    window = 2 * max((places[1] - places[0]) // 3, 1) + 1
+    value, slope, bend = (
+        scipy.signal.savgol_filter(series, window, 2, deriv=order)[places] for order in range(3)
+    )
+    shift = -np.divide(slope, bend, out=np.zeros_like(bend), where=bend != 0)
+    gaps = np.diff(places + shift)
+    length = int(np.argmin(np.append(gaps < APART * gaps[0], False)))
+    if length < 2:
+        return nothing
+    gaps, ranges = gaps[:length], 0.5 * np.abs(np.diff(value + 0.5 * slope * shift))[:length]
+    decrements = 2 * np.log(ranges[:-1] / ranges[1:])
+    amplitudes = np.sqrt(ranges[:-1] * ranges[1:])
+    p, q = float(decrements.mean()), np.nan
+    if decrements.size >= 3:
+        q, p = map(float, np.polyfit(amplitudes, decrements, 1, w=amplitudes))
+    period = 2 * dt * float(np.average(gaps, weights=ranges))
+    ratio = float(p / np.hypot(2 * np.pi, p))
+    return Decay(period, ratio, p, q, decrements.size, amplitudes, decrements)
 
 
 PERIODS = 32
