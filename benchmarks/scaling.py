@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 import seakeep
 from seakeep.core import identify, rollout, training_window
-from seakeep.core.gram import BLOCK_WIDTH
+from seakeep.core.embedding import BLOCK_WIDTH
 from seakeep.core.rollout import _doublings as doublings
 from seakeep.core.rollout import _shifting_steps as shifting_steps
 from seakeep.report.style import COLOURS, figure_style, new_figure, save_figure

@@ -152,16 +152,14 @@ CHANGES = {
         ("np.exp(-0.5 * (h[:, None] * angular) ** 2)", "np.exp(-((h[:, None] * angular) ** 2))", "statistics/test_density.py::test_densities_are_scipys"),
     ],
     "core/embedding.py": [
-        ("last - window + 1", "last - window", "core/test_embedding.py::test_windows_at_the_papers_delays"),
-        ("max(first, earliest)", "max(first, earliest) + 1", "core/test_embedding.py::test_windows_at_the_papers_delays"),
-        ("reach = max(state_delays, input_delays)", "reach = state_delays", "core/test_embedding.py::test_windows_at_the_papers_delays"),
-        ("axis=0)[::-1]", "axis=0)", "core/test_embedding.py::test_blocks_are_lag_major_the_newest_first"),
-    ],
-    "core/gram.py": [
         ("min(piece.count, delay + 1))", "min(piece.count, delay))", "core/test_fast_paths.py::test_the_trace_is_the_sum_of_squares"),
         ("return self.states[self.first + 1 : self.first + 1 + self.count]", "return self.states[self.first : self.first + self.count]", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
         ("row += gram[at - N : at, other.newer]", "row += 0.0 * gram[at - N : at, other.newer]", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
         ("signed[1::2] *= -1.0", "signed[0::2] *= -1.0", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
+        ("last - window + 1", "last - window", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+        ("max(first, earliest)", "max(first, earliest) + 1", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+        ("reach = max(state_delays, input_delays)", "reach = state_delays", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+        ("axis=0)[::-1]", "axis=0)", "core/test_embedding.py::test_blocks_are_lag_major_the_newest_first"),
     ],
     "core/kalman.py": [
         ("on[:, count:] += reach[:, : size - count]", "on[:, :-count] += reach[:, : size - count]", "core/test_kalman.py::test_errors_of_today_are_carried_as_the_model_carries_them"),

@@ -11,8 +11,7 @@ from matrices import Problem
 from numpy.testing import assert_allclose
 
 from seakeep.core import rollout
-from seakeep.core.embedding import TrainingWindow
-from seakeep.core.gram import gram_trace
+from seakeep.core.embedding import TrainingWindow, gram_trace
 
 ROLLOUT = sys.modules["seakeep.core.rollout"]
 

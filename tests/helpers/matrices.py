@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seakeep.core import embed, identify
-from seakeep.core.gram import Delayed
+from seakeep.core.embedding import Delayed
 
 
 @dataclass(frozen=True)

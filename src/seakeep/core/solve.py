@@ -1,7 +1,8 @@
 r"""Tikhonov-regularised and rank-truncated least squares, :math:`\hat X' \approx G \hat Y`.
 
-Gram matrices of delayed series come from their structure (:mod:`seakeep.core.gram`), and the form
-is chosen by shape and conditioning:
+Gram matrices of delayed series come from their structure (:mod:`seakeep.core.embedding`), their
+Cholesky factorisation gives the coefficients at each λ, and the form is chosen by shape and
+conditioning:
 
 * primal, :math:`G = X' Y^T (Y Y^T + \lambda I)^{-1}` (the paper's formula), or dual,
   :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
@@ -35,19 +36,18 @@ from typing import Literal
 
 import numpy as np
 from scipy import linalg
-from scipy.linalg import blas
+from scipy.linalg import blas, lapack
 
 from seakeep.arrays import FloatArray
-from seakeep.core.embedding import TrainingWindow, embed
-from seakeep.core.gram import (
+from seakeep.core.embedding import (
     Delayed,
     PrimalSystem,
-    factorise,
+    TrainingWindow,
+    embed,
     gram_trace,
     lagged_sums,
     primal_system,
     snapshot_gram,
-    solve_rows,
 )
 from seakeep.core.response import clip_modes
 
@@ -332,3 +332,46 @@ def _generators(
     plus = np.concatenate([moved[0:edges:2], newest + heads])
     minus = np.concatenate([moved[1:edges:2], newest - heads])
     return plus, minus
+
+
+def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> FloatArray:
+    """Coefficients of ridge regressions of one problem at several λ.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (p, p)
+        Products of the regressors; the upper triangle is read.
+    right : ndarray, shape (N, p)
+        Products of the targets with the regressors.
+    ridges : sequence of float
+        λ > 0, each; what is below the rounding of the Gram matrix is raised to it.
+
+    Returns
+    -------
+    ndarray, shape (len(ridges), N, p)
+    """
+    least = len(gram) * float(np.finfo(float).eps * gram.diagonal().max())
+    return np.stack(
+        [solve_rows(factorise(gram.copy(), max(ridge, least)), right.copy()) for ridge in ridges]
+    )
+
+
+def factorise(gram: FloatArray, ridge: float) -> FloatArray:
+    """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
+
+    The triangle above the factor keeps what stood there.
+    """
+    size = len(gram)
+    gram.reshape(-1)[:: size + 1] += ridge
+    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
+    if failed:
+        raise np.linalg.LinAlgError(
+            f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
+            "definite. Raise ridge."
+        )
+    return factor
+
+
+def solve_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
+    return lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0].T

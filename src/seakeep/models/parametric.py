@@ -15,8 +15,7 @@ import numpy as np
 
 from seakeep.arrays import Datasets, FloatArray
 from seakeep.core.embedding import spread_means
-from seakeep.core.gram import ridge_path
-from seakeep.core.solve import Solution
+from seakeep.core.solve import Solution, ridge_path
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
 from seakeep.models.inputs import Signature

@@ -6,7 +6,7 @@ and channels of the NRMSE decides. The noise is the standard error, over what is
 difference between two candidates. Of what settings leave open, the simplest candidate is taken that
 errs at most 5 % more than the best, or is as good but for the noise; what a search starts from is
 left for nothing less. The regressors of all candidates are made once; one Gram matrix of a
-fold, with the longest delays, gives the path of λ of all of them (:mod:`seakeep.core.gram`). Free
+fold, with the longest delays, gives the path of λ of all of them (:mod:`seakeep.core.solve`). Free
 runs of candidates with equal columns go side by side: a worker takes all of them on a fold.
 """
 
@@ -32,8 +32,8 @@ import numpy as np
 
 from seakeep import metrics
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
-from seakeep.core.embedding import spread_means, training_window
-from seakeep.core.gram import PrimalSystem, ridge_path
+from seakeep.core.embedding import PrimalSystem, spread_means, training_window
+from seakeep.core.solve import ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.executor import in_order
 from seakeep.models import labelled

@@ -11,10 +11,12 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
-from seakeep.core import gram
 from seakeep.core.embedding import (
+    Delayed,
+    PrimalSystem,
     TrainingWindow,
     block_means,
+    primal_system,
     spread_means,
     training_window,
 )
@@ -170,13 +172,13 @@ def system_of(
     groups: Sequence[Sequence[FloatArray]],
     windows: Sequence[TrainingWindow],
     settings: HankelSettings,
-) -> gram.PrimalSystem:
+) -> PrimalSystem:
     """Gram matrix of runs, given as states, delayed and direct regressors, each by run."""
     states, delayed, direct = groups
     series = [(delayed, settings.input_delays), (with_means(settings, states, direct), 0)]
     if not settings.is_filter:
         series.insert(0, (states, settings.state_delays))
-    return gram.primal_system(gram.Delayed.of(states, series, windows))
+    return primal_system(Delayed.of(states, series, windows))
 
 
 def gather(
