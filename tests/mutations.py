@@ -128,21 +128,19 @@ CHANGES = {
         ("np.arange(a, a + n - block_length + 1)", "np.arange(a, a + n)", "statistics/test_bootstrap.py::test_no_block_crosses_a_join_of_segments"),
         ("special.stdtrit(blocks - 1.0, 0.5 + level / 2)", "1.96", "statistics/test_two_way.py::test_the_interval_holds_the_truth_as_often_as_it_says"),
     ],
-    "core/calibration.py": [
+    "core/bands.py": [
+        ("2.0 * density - 1.0 / np.sqrt(np.pi)", "density - 1.0 / np.sqrt(np.pi)", "statistics/test_coverage.py::test_the_crps_is_the_integral_that_defines_it"),
+        ("mask=lost)", "mask=False)", "statistics/test_coverage.py::test_a_table_by_wave_height_and_horizon_by_hand"),
+        ('2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_the_score_of_the_true_band_is_that_of_the_normal_distribution"),
+        ("below, above = (m < low).mean(axis=time), (m > high).mean(axis=time)", "below, above = (m > high).mean(axis=time), (m < low).mean(axis=time)", "statistics/test_coverage.py::test_each_channel_and_window_is_judged_alone"),
         ("1.0 + 1.0 / blocks", "1.0", "statistics/test_calibration.py::test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept"),
         ("lower - margin, upper + margin", "lower - margin, upper", "models/test_calibration.py::test_the_calibrated_band_covers_unseen_windows_as_it_says"),
         ("np.hypot(std, floor)", "np.maximum(std, floor)", "models/test_calibration.py::test_the_band_is_a_factor_times_the_spread_with_a_floor"),
         ('np.maximum(low - finite(y, "measured"), y - high)', 'np.maximum(low - finite(y, "measured"), high - y)', "statistics/test_calibration.py::test_scores_by_hand_and_a_band_that_is_lost"),
         ("total += 2.0 * correlation", "total += correlation", "statistics/test_calibration.py::test_the_block_is_the_integrated_correlation_time"),
     ],
-    "core/coverage.py": [
-        ("np.isnan(between), higher, between", "np.isnan(between), np.inf, between", "statistics/test_coverage.py::test_infinite_values_count_and_nan_does_not"),
-        ("2.0 * density - 1.0 / np.sqrt(np.pi)", "density - 1.0 / np.sqrt(np.pi)", "statistics/test_coverage.py::test_the_crps_is_the_integral_that_defines_it"),
-        ("mask=lost)", "mask=False)", "statistics/test_coverage.py::test_a_table_by_wave_height_and_horizon_by_hand"),
-        ('2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_the_score_of_the_true_band_is_that_of_the_normal_distribution"),
-        ("below, above = (m < low).mean(axis=time), (m > high).mean(axis=time)", "below, above = (m > high).mean(axis=time), (m < low).mean(axis=time)", "statistics/test_coverage.py::test_each_channel_and_window_is_judged_alone"),
-    ],
     "core/density.py": [
+        ("np.isnan(between), higher, between", "np.isnan(between), np.inf, between", "statistics/test_coverage.py::test_infinite_values_count_and_nan_does_not"),
         ('"paper": (1.06, 1.0)', '"paper": (1.06, 1.34)', "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
         ("bootstrapped_densities(m, others,", "bootstrapped_densities(m, positions,", "statistics/test_divergence.py::test_a_perfect_prediction_is_zero_and_its_floor_is_not"),
         ("out[rows] = _densities(ordered, times[rows], grid, h[rows])", "out[rows] = _densities(ordered, times[rows[::-1]], grid, h[rows])", "statistics/test_divergence.py::test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks"),

@@ -15,25 +15,26 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import finite
-from seakeep.core import bootstrap, density
-from seakeep.core import coverage as of_arrays
+from seakeep.core import bands, bootstrap, density
+from seakeep.core.bands import (
+    BandCoverage,
+    ConformalMargin,
+    CoverageTable,
+    band_crps,
+    band_scores,
+    conformal_margin,
+    winkler_score,
+)
 from seakeep.core.bootstrap import (
     block_length,
     lag_one_correlation,
     overlap_block,
     two_way_interval,
 )
-from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
-from seakeep.core.coverage import (
-    BandCoverage,
-    BoxStatistics,
-    CoverageTable,
-    band_crps,
-    box_statistics,
-    winkler_score,
-)
 from seakeep.core.density import (
+    BoxStatistics,
     JsdInterval,
+    box_statistics,
     density_grid,
     jensen_shannon,
     kernel_bandwidth,
@@ -142,11 +143,11 @@ def jsd_interval(
     )
 
 
-@functools.wraps(of_arrays.coverage)
+@functools.wraps(bands.coverage)
 def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     """Judge the channels of all; one with gaps is named."""
     if not _are_datasets(lower=lower, upper=upper, measured=measured):
-        return of_arrays.coverage(lower, upper, measured)
+        return bands.coverage(lower, upper, measured)
     pairs = pair(lower=lower, upper=upper, measured=measured)
     names, lead = pairs.names, pairs.lead
     m = pairs.arrays["measured"]
@@ -156,7 +157,7 @@ def coverage(lower: Any, upper: Any, measured: Any) -> Any:
                 f"channel '{name}' of measured holds values that are NaN or infinite. Fill its "
                 "gaps first, or judge a window without them."
             )
-    band = of_arrays.coverage(**pairs.arrays)
+    band = bands.coverage(**pairs.arrays)
     return xr.Dataset(
         {key: ((*lead, "channel"), values) for key, values in vars(band).items()},
         coords=_channels(names, measured)
@@ -170,20 +171,20 @@ def _channels(names: Sequence[str], measured: xr.Dataset) -> dict[str, Any]:
     return {"channel": list(names), "unit": ("channel", units)}
 
 
-@functools.wraps(of_arrays.coverage_table)
+@functools.wraps(bands.coverage_table)
 def coverage_table(
     lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None
 ) -> Any:
     """Judge the channels of all, by parts of the horizon and by wave height."""
     if not _are_datasets(lower=lower, upper=upper, measured=measured):
-        return of_arrays.coverage_table(lower, upper, measured, level, waves)
+        return bands.coverage_table(lower, upper, measured, level, waves)
     pairs = pair(lower=lower, upper=upper, measured=measured)
     heights = None
     if waves is not None:
         first = pairs.names[0]  # a height beside the bounds of a channel, at their instants
         alone = xr.Dataset({first: waves.assign_attrs(units="")})
         heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]
-    shares = of_arrays.coverage_table(**pairs.arrays, level=level, waves=heights)
+    shares = bands.coverage_table(**pairs.arrays, level=level, waves=heights)
     dims = {"instants": ("part",)}
     table = xr.Dataset(
         {

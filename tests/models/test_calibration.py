@@ -9,7 +9,7 @@ from records import table
 from said import request_error
 
 import seakeep
-from seakeep.core.calibration import band_scores, conformal_margin
+from seakeep.core.bands import band_scores, conformal_margin
 from seakeep.models.calibration import held_out, learn_margin
 
 DT = 0.1

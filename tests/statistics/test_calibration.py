@@ -6,7 +6,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal, stats
 
-from seakeep.core.calibration import (
+from seakeep.core.bands import (
     band_scale,
     learn_scale,
     scaled_scores,

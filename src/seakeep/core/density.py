@@ -1,8 +1,9 @@
-r"""Kernel densities of a series, and their interval over bootstrapped series (paper, eq. PDF).
+r"""Distributions of series: kernel densities, their interval and divergence, and box plots.
 
+A density is (paper, eq. PDF)
 :math:`PDF(\xi, y) = \frac{1}{\mathcal T h} \sum_i K((y - \xi_i)/h)` with a normal kernel.
 
-Jensen–Shannon divergence of two series, its interval, and its noise floor (paper, eq. JSD).
+Jensen–Shannon divergence of two series has an interval and a noise floor (paper, eq. JSD).
 """
 
 import math
@@ -17,7 +18,15 @@ from scipy.sparse import csc_array
 from scipy.special import rel_entr
 from scipy.stats import gaussian_kde
 
-from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, as_series, whole_number
+from seakeep.arrays import (
+    FloatArray,
+    IntArray,
+    as_bundle,
+    as_real,
+    as_series,
+    undefined,
+    whole_number,
+)
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 
@@ -495,3 +504,84 @@ def jsd_intervals(
             )
         )
     return intervals
+
+
+@dataclass(frozen=True)
+class BoxStatistics:
+    """The numbers that a box plot draws.
+
+    Attributes
+    ----------
+    lower_quartile, median, upper_quartile : float
+        Quartiles, interpolated linearly.
+    lower_whisker, upper_whisker : float
+        Furthest values within 1.5 inter-quartile ranges of the box.
+    outliers : ndarray, shape (outlier,)
+        Values beyond the whiskers, ascending.
+    mean : float
+        Mean.
+    count : int
+        Values judged.
+    left_out : int
+        Values that were NaN.
+    """
+
+    lower_quartile: float
+    median: float
+    upper_quartile: float
+    lower_whisker: float
+    upper_whisker: float
+    outliers: FloatArray
+    mean: float
+    count: int
+    left_out: int
+
+
+def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
+    """Quartiles, whiskers and outliers of a sample (Tukey), as matplotlib draws them.
+
+    Parameters
+    ----------
+    values : array_like
+        Numbers in any shape; NaN is left out and counted. Infinite ones, such as the error of a
+        forecast that diverged, are values like others.
+
+    Returns
+    -------
+    BoxStatistics
+
+    Raises
+    ------
+    DataError
+        If all values are NaN.
+
+    Examples
+    --------
+    >>> box = box_statistics([1, 2, 3, 4, 5, 20])
+    >>> box.median, box.upper_whisker, box.outliers
+    (3.5, 5.0, array([20.]))
+    """
+    everything = as_real(values, "values").ravel()
+    x = np.sort(everything[~np.isnan(everything)])
+    if x.size == 0:
+        raise DataError(f"all {everything.size} value(s) are NaN; there is no box to draw.")
+    with undefined():  # beside an infinite value
+        between, higher = (
+            np.quantile(x, [0.25, 0.5, 0.75], method=m) for m in ("linear", "higher")
+        )
+    first, middle, third = np.where(np.isnan(between), higher, between).tolist()
+    room = 1.5 * (third - first)
+    # A whisker never ends inside the box, also where no value lies between it and the fence.
+    low = min(float(x[~(x < first - room)][0]), first)
+    high = max(float(x[~(x > third + room)][-1]), third)
+    return BoxStatistics(
+        lower_quartile=first,
+        median=middle,
+        upper_quartile=third,
+        lower_whisker=low,
+        upper_whisker=high,
+        outliers=x[(x < low) | (x > high)],
+        mean=float(x.mean()),
+        count=int(x.size),
+        left_out=int(everything.size - x.size),
+    )

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray, Progress, check_choice, fraction, whole_number
-from seakeep.core.calibration import (
+from seakeep.core.bands import (
     ConformalMargin,
     band_scale,
     band_scores,
@@ -102,7 +102,7 @@ class Calibration:
         Least scale of each state, a quarter of its root mean square error; None where the margin
         is constant.
     law : ndarray of shape (4, N), or None
-        Coefficients of a learnt scale (:func:`seakeep.core.calibration.learn_scale`).
+        Coefficients of a learnt scale (:func:`seakeep.core.bands.learn_scale`).
     windows : dict of str to int
         Number of windows in each run.
     steps : int

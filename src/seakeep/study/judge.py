@@ -19,7 +19,7 @@ import xarray as xr
 
 from seakeep import statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
-from seakeep.core.calibration import band_scale, calibrated_bounds
+from seakeep.core.bands import band_scale, calibrated_bounds
 from seakeep.core.density import NUMBERS, jsd_intervals
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, SeakeepError, quiet, warn

@@ -23,7 +23,7 @@ import xarray as xr
 
 from seakeep import metrics
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
-from seakeep.core.calibration import ConformalMargin
+from seakeep.core.bands import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
 from seakeep.formats.columns import decoding
