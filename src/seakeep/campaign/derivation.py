@@ -1,15 +1,20 @@
-"""Derived channels: what they need, and how expressions and named steps make them."""
+"""Derived channels, made by expressions and named steps."""
 
-from collections.abc import Collection, Mapping, Sequence
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of, units_of
-from seakeep.conventions import TURNS, canonical_channel, conversion, si_unit
+from seakeep.campaign.settings import (
+    CampaignSettings,
+    DerivedSettings,
+    long_name_of,
+    sources_of,
+    units_of,
+)
+from seakeep.conventions import TURNS, conversion, si_unit
 from seakeep.errors import DataError, RequestError, naming
 from seakeep.quality.faults import BRIDGED, MISSING, flag_attributes
 from seakeep.signals import (
@@ -33,43 +38,6 @@ AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
 
 
 Channels = Mapping[Any, xr.Variable]
-
-
-def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None = None) -> list[str]:
-    """Names of channels, by default all, and of all that they are derived from, these first."""
-    graph: dict[str, Sequence[str]] = {}
-    ahead = list(settings.channel_names if wanted is None else wanted)
-    while ahead:
-        if (name := ahead.pop(0)) not in graph:
-            own = settings.derived.get(name)
-            graph[name] = sources_of(name, own, settings.channel_names) if own else ()
-            ahead += graph[name]
-    try:
-        return list(TopologicalSorter(graph).static_order())
-    except CycleError as error:
-        shown = " -> ".join(reversed(error.args[1]))
-        raise RequestError(
-            f"derived channels need one another in a circle: {shown}. Make one of them from "
-            "measured channels."
-        ) from None
-
-
-def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) -> tuple[str, ...]:
-    """Channels that a derived channel needs."""
-    if settings.expression is not None:
-        return parse(settings.expression).channels
-    sources = [str(settings.source)]
-    if settings.position is not None:
-        sources.append(settings.position)
-    sources += settings.components or ()
-    if settings.step in ("transfer", "remove_gravity"):
-        turning = ["", "_rate", "_acceleration"]
-        if settings.step == "remove_gravity":
-            turning = [""]
-        elif known := canonical_channel(sources[0]) or canonical_channel(name):
-            turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
-        sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
-    return tuple(dict.fromkeys(each for each in sources if each != name))
 
 
 def derive(

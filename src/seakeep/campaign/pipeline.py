@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray
-from seakeep.campaign.derivation import derive, needed_channels, sources_of
+from seakeep.campaign.derivation import derive
 from seakeep.campaign.readers import (
     counts_samples,
     find_column,
@@ -40,6 +40,8 @@ from seakeep.campaign.settings import (
     PreparationSettings,
     RunSettings,
     long_name_of,
+    needed_channels,
+    sources_of,
     units_of,
 )
 from seakeep.conventions import MOTIONS, conversion

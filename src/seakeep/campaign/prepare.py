@@ -13,9 +13,14 @@ from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
 from seakeep.campaign.pipeline import Run, celerity_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
-from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
+from seakeep.campaign.settings import (
+    CampaignSettings,
+    ModelSettings,
+    RunSettings,
+    cross_checks,
+    span_mistakes,
+)
 from seakeep.campaign.survey import Failures, Survey, survey
-from seakeep.campaign.validation import cross_checks, span_mistakes
 from seakeep.errors import DataError, MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import digest_of, expanded, version
 from seakeep.quality import as_json, judge_runs, warn_of

@@ -1,31 +1,37 @@
-"""Tables of a campaign file: one frozen table per section, validated by pydantic.
+"""Tables of a campaign file: one frozen table per section, and what they say against one another.
 
-Nothing is read from disk here; :mod:`seakeep.campaign.validation` fills these tables from TOML and
-turns what does not fit into messages. The text below a field is the remedy that a message proposes.
+Nothing is read from disk here. Pydantic validates a table, and :func:`cross_checks` all of them
+together; one message names every mistake. The text below a field is the remedy that it proposes.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
-from seakeep.conventions import canonical_channel, is_elevation, si_unit
-from seakeep.errors import RequestError
+from seakeep.conventions import TURNS, canonical_channel, conversion, is_elevation, si_unit
+from seakeep.errors import RequestError, did_you_mean
 from seakeep.formats import Options
+from seakeep.signals.expressions import parse
 from seakeep.toml import (
     Duration,
     Finite,
     Instant,
     Listed,
+    Mistake,
     Names,
     NotNegative,
     Pair,
     Positive,
     Span,
     Table,
+    in_seconds,
+    lengths,
     packaged,
     parse_length,
 )
@@ -543,3 +549,192 @@ def units_of(name: str, unit: str) -> str:
     """SI unit in which a channel is kept: the canonical one, or that of the dimension of `unit`."""
     canonical = canonical_channel(name)
     return canonical.units if canonical else si_unit(unit)
+
+
+def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None = None) -> list[str]:
+    """Names of channels, by default all, and of all that they are derived from, these first."""
+    graph: dict[str, Sequence[str]] = {}
+    ahead = list(settings.channel_names if wanted is None else wanted)
+    while ahead:
+        if (name := ahead.pop(0)) not in graph:
+            own = settings.derived.get(name)
+            graph[name] = sources_of(name, own, settings.channel_names) if own else ()
+            ahead += graph[name]
+    try:
+        return list(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        shown = " -> ".join(reversed(error.args[1]))
+        raise RequestError(
+            f"derived channels need one another in a circle: {shown}. Make one of them from "
+            "measured channels."
+        ) from None
+
+
+def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) -> tuple[str, ...]:
+    """Channels that a derived channel needs."""
+    if settings.expression is not None:
+        return parse(settings.expression).channels
+    sources = [str(settings.source)]
+    if settings.position is not None:
+        sources.append(settings.position)
+    sources += settings.components or ()
+    if settings.step in ("transfer", "remove_gravity"):
+        turning = ["", "_rate", "_acceleration"]
+        if settings.step == "remove_gravity":
+            turning = [""]
+        elif known := canonical_channel(sources[0]) or canonical_channel(name):
+            turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
+        sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
+    return tuple(dict.fromkeys(each for each in sources if each != name))
+
+
+def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
+    """What tables of a campaign say against one another."""
+    yield from _unit_mistakes(settings)
+    yield from _derived_mistakes(settings)
+    yield from _name_mistakes(settings)
+    wave = settings.campaign.period_channel
+    if wave is None or wave in settings.channel_names:
+        yield from _period_mistakes(settings)
+    known = list(settings.instruments.loggers)
+    used = {logger for run in settings.runs.values() for logger in run.files}
+    reference = settings.instruments.reference
+    if reference is not None and reference not in {*known, *used}:
+        near = did_you_mean(reference, sorted(used))
+        words = f"received {reference!r}, which no run has a file of.{near}"
+        yield ("instruments", "reference"), words
+    for run, each in settings.runs.items():
+        for logger in each.files:
+            if known and logger not in known:
+                yield (
+                    ("runs", run, "files", logger),
+                    f"no table [instruments.{logger}].{did_you_mean(logger, known)} "
+                    f"Instruments: {', '.join(known)}.",
+                )
+    spelt: dict[str, str] = {}
+    for run, each in settings.runs.items():
+        if (other := spelt.setdefault(run.lower(), run)) != run:
+            yield (
+                ("runs", run),
+                f"'{other}' differs only in the case of its letters, and files are named after "
+                "both. Rename one.",
+            )
+        for name in each.channels:
+            if name not in settings.channels:
+                yield (
+                    ("runs", run, "channels", name),
+                    f"no table [channels.{name}] to change.{did_you_mean(name, settings.channels)} "
+                    "Add it there first.",
+                )
+
+
+def span_mistakes(settings: CampaignSettings, period: float) -> Iterable[Mistake]:
+    """Spans of which one end counts in periods, and which run backwards with a period (s)."""
+    for run, each in settings.runs.items():
+        spans = {"record": each.record, "span": each.span, "train": each.train, "test": each.test}
+        for key, span in spans.items():
+            if span is None:
+                continue
+            start, end = (in_seconds(edge, period) for edge in span)
+            if not start < end:
+                yield (
+                    ("runs", run, key),
+                    f"received [{span[0]}, {span[1]}], which with an encounter period of "
+                    f"{period:.6g} s is [{start:g}, {end:g}]. State the lower one first.",
+                )
+
+
+def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
+    """Names of channels that the campaign has no channel of."""
+    names = settings.channel_names
+    wanted: list[tuple[tuple[str, ...], str]] = [
+        (("rig", "positions", name), name) for name in settings.rig.positions
+    ]
+    if settings.campaign.period_channel is not None:
+        wanted.append((("campaign", "period_channel"), settings.campaign.period_channel))
+    for table, model in settings.all_models().items():
+        place = tuple(table.split(".", 1))
+        wanted += [((*place, key), n) for key in ("states", "inputs") for n in getattr(model, key)]
+    for key, pair in settings.redundant.items():
+        wanted += [(("redundant", key, "channels"), name) for name in pair.channels]
+    for place, name in wanted:
+        if name not in names:
+            received = "" if place[-1] == name else f"received {name!r}, "
+            near = did_you_mean(name, names)
+            yield place, f"{received}no such channel.{near} Channels: {', '.join(names)}."
+
+
+def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
+    """Keys in encounter periods where there is no period, or where it is measured with them."""
+    places = list(lengths(settings))
+    wave, stated = settings.wave_channel, settings.campaign.encounter_period
+    if stated:
+        yield from span_mistakes(settings, stated)
+    if not places or stated:
+        return
+    if wave is None:
+        yield (
+            places[0],
+            "counts in encounter periods, and the campaign has none. State encounter_period (s) or "
+            "period_channel in [campaign], or name a channel eta_…",
+        )
+        return
+    for place in places:
+        head, name, *_ = place
+        if (head == "runs" and name in settings.period_runs) or head == "instruments":
+            yield (
+                place,
+                "counts in encounter periods, and the period is measured with it, as the "
+                f"zero-up-crossing period of {wave}. State encounter_period (s) in [campaign], or "
+                "this in seconds.",
+            )
+
+
+def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
+    tables: dict[tuple[str, ...], Mapping[str, ChannelSettings | DerivedSettings]] = {
+        ("channels",): settings.channels,
+        ("derived",): settings.derived,
+    }
+    tables |= {("runs", run, "channels"): each.channels for run, each in settings.runs.items()}
+    for place, channels in tables.items():
+        for name, each in channels.items():
+            if each.unit is None:
+                continue
+            try:
+                conversion(each.unit, units_of(name, each.unit), name)
+            except RequestError as error:
+                yield (*place, name, "unit"), str(error)
+
+
+def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
+    names = settings.channel_names
+    sound = True
+    for name, each in settings.derived.items():
+        place = ("derived", name)
+        if name in settings.channels:
+            yield place, f"[channels.{name}] exists too. Rename one of them."
+        try:
+            sources = sources_of(name, each, names)
+        except RequestError as error:
+            sound = False
+            yield (*place, "expression"), str(error)
+            continue
+        key = "expression" if each.expression is not None else "from"
+        for source in sources:
+            if source not in names:
+                near = did_you_mean(source, names)
+                yield (
+                    (*place, key),
+                    f"the channel '{source}' does not exist.{near} Channels: {', '.join(names)}.",
+                )
+        if each.expression is not None and each.unit is None and canonical_channel(name) is None:
+            yield (
+                (*place, "unit"),
+                f"missing. '{name}' is a free name; state the unit of the expression, such as "
+                "unit = 'm' ('-' for none).",
+            )
+    if sound:
+        try:
+            needed_channels(settings)
+        except RequestError as error:
+            yield ("derived",), str(error)
