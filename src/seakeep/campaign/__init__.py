@@ -2,10 +2,9 @@
 
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.live_chain import LiveChain
-from seakeep.campaign.prepare import Campaign, read_campaign
+from seakeep.campaign.prepare import Campaign, load_prepared, read_campaign, write_prepared
 from seakeep.campaign.readers import read_table
 from seakeep.campaign.settings import ModelSettings
-from seakeep.campaign.store import load_prepared, write_prepared
 
 __all__ = [
     "Campaign",

@@ -273,7 +273,7 @@ def prepare(
     Example: seakeep prepare docs/tutorial/campaign.toml
     """
     from seakeep.campaign import read_campaign, write_prepared
-    from seakeep.campaign.store import prepared_folder
+    from seakeep.campaign.prepare import prepared_folder
     from seakeep.campaign.survey import as_one
     from seakeep.report.quality_sheet import SHEET
 

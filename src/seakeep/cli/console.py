@@ -189,7 +189,7 @@ Degrees = Annotated[bool, Option("--degrees/--radians", help="Unit of angles.")]
 
 def read_files(campaign: Campaign, *others: Path) -> list[Path]:
     """Files that a command on a campaign reads: its own, the raw ones, and the prepared ones."""
-    from seakeep.campaign.store import prepared_folder
+    from seakeep.campaign.prepare import prepared_folder
 
     files = [campaign.path, *others]
     for name in campaign.settings.runs:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.campaign.store import prepared_folder
+from seakeep.campaign.prepare import prepared_folder
 from seakeep.check.parts import whole_span
 from seakeep.conventions import in_waves
 from seakeep.errors import RequestError, SeakeepError, warn
