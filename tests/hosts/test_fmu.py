@@ -11,7 +11,7 @@ from said import request_error
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_fmu
-from seakeep.hosts.fmu import compiler
+from seakeep.hosts.c import compiler
 
 fmpy = pytest.importorskip("fmpy")
 if compiler() is None:

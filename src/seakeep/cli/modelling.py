@@ -398,7 +398,7 @@ def _single(file: Path, member: int | None) -> Model:
 
 
 def _binary(fmu: Path) -> str:
-    from seakeep.hosts.fmu import compiler
+    from seakeep.hosts.c import compiler
 
     if compiler():
         return f"{fmu} holds a binary for this platform, and the sources for others."

@@ -1,7 +1,19 @@
-"""C99 sources of a model and of its estimator, without any dependency."""
+"""C99 sources of a model and of its estimator, without any dependency, alone or as an FMU.
 
+A functional mock-up unit puts the sources behind FMI 2.0 for co-simulation.
+"""
+
+import hashlib
 import math
+import os
+import platform
 import re
+import shlex
+import shutil
+import subprocess
+import tempfile
+import uuid
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +23,9 @@ import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.core.readouts import SOFT
-from seakeep.files import MARK, check_output, make_folder, templates, version, write_text
-from seakeep.hosts.program import exportable
+from seakeep.errors import RequestError
+from seakeep.files import MARK, check_output, make_folder, replacing, templates, version, write_text
+from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model, validity
 from seakeep.models.engine import GROWTH, fading
 from seakeep.models.forecasts import DOUBTED
@@ -22,7 +35,8 @@ from seakeep.signals import prediction
 from seakeep.signals.expressions import Text
 from seakeep.waves import GRAVITY
 
-KIND = "C source"
+SOURCE, UNIT = "C source", "functional mock-up unit"
+"""Kinds of files, as their marks say it."""
 
 
 def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
@@ -52,7 +66,7 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Numbers are written in hexadecimal, so that none is rounded. ``cc -std=c99 -Wall -Werror``
     compiles the code without a warning.
     """
-    return _written(sources(exportable(model), identifier(name)), folder)
+    return _written(_sources(exportable(model), identifier(name)), folder)
 
 
 def write_estimator(
@@ -85,13 +99,13 @@ def write_estimator(
     """
     linear = exportable(model, follows=True)
     live = linear.live(noise=noise, roles=roles)
-    return _written(sources(linear, identifier(name), live), folder)
+    return _written(_sources(linear, identifier(name), live), folder)
 
 
 def _written(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
     targets = {make_folder(Path(folder)) / file: text for file, text in texts.items()}
     for target in targets:
-        check_output(target, KIND)
+        check_output(target, SOURCE)
     for target, text in targets.items():
         write_text(target, text)
     return list(targets)
@@ -103,7 +117,7 @@ def identifier(name: str) -> str:
     return text if text[:1].isalpha() else f"m_{text}"
 
 
-def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict[str, str]:
+def _sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict[str, str]:
     """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
     follows, observed = input_map.follows, input_map.columns
@@ -121,7 +135,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
     content = {
         "name": name,
-        "mark": f"{MARK}: {KIND}, written by seakeep {version()}:",
+        "mark": f"{MARK}: {SOURCE}, written by seakeep {version()}:",
         "model": model,
         "now": back,
         "delayed": delayed,
@@ -137,7 +151,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
             if follows and each.load
         ],
     }
-    files = {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
+    files = {f"{name}.{end}": _rendered(f"model.{end}", **content) for end in ("h", "c")}
     if live:
         content |= live.equations | {
             "prediction": prediction,
@@ -148,11 +162,11 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
             "doubted": DOUBTED,
         }
         for end in ("h", "c"):
-            files[f"{name}_estimator.{end}"] = rendered(f"estimator.{end}", **content)
+            files[f"{name}_estimator.{end}"] = _rendered(f"estimator.{end}", **content)
     return files
 
 
-def rendered(template: str, **content: Any) -> str:
+def _rendered(template: str, **content: Any) -> str:
     """Text of a template of this room."""
     environment = templates("hosts")
     environment.filters |= {"hex": _number, "numbers": _numbers, "text": _text}
@@ -187,3 +201,176 @@ def _columns(
         kernels.append(term.kernel)
     filtered = f"{term.order}, kernel_{number}, {len(term.kernel) // 2}"
     return [f"slow_square(u + ({shift}) * Q + {term.place}, {filtered})" for shift in term.shifts]
+
+
+PLATFORMS = {
+    "Linux x86_64": ("linux64", ".so"),
+    "Darwin x86_64": ("darwin64", ".dylib"),
+    "Darwin arm64": ("darwin64", ".dylib"),
+    "Windows AMD64": ("win64", ".dll"),
+}
+"""Folder of a binary in an FMU and its suffix, by system and processor."""
+HERE = f"{platform.system()} {platform.machine()}"
+
+
+def write_fmu(
+    model: Model,
+    path: str | Path,
+    ahead: int | None = None,
+    noise: Mapping[str, float] | None = None,
+    roles: Mapping[str, str] | None = None,
+) -> Path:
+    """Write a model as an FMU 2.0 for co-simulation.
+
+    It holds the sources of :func:`seakeep.hosts.write_c` and, where a C compiler is found, a binary
+    for this platform. Parameters ``history.NAME[1]`` … are the measured samples from which it
+    starts, oldest first.
+
+    Parameters
+    ----------
+    model : Model
+        As for :func:`seakeep.hosts.write_c`.
+    path : str or Path
+        File to write; its suffix should be ``.fmu``.
+    ahead : int, optional
+        Instants that an estimator forecasts. With it the unit follows a vessel, as
+        :func:`seakeep.hosts.write_estimator` says: inputs ``measured.NAME`` are the states, NaN
+        where they were not measured, and outputs their estimates, ``ahead.NAME[1]`` …, and the
+        standard deviations ``std.NAME[1]`` …
+    noise, roles : mapping, optional
+        Of an estimator, as for ``model.live``.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RequestError
+        If the model cannot be exported, a file is there that seakeep did not write, or the
+        compiler fails.
+    """
+    target = Path(path)
+    if ahead is None and (noise or roles):
+        raise RequestError("noise and roles are those of an estimator: give ahead, or neither.")
+    check_output(target, UNIT)
+    linear, name = exportable(model, ahead is not None), identifier(target.stem)
+    files = _sources(linear, name, None if ahead is None else linear.live(noise=noise, roles=roles))
+    digest = hashlib.sha256("".join(files.values()).encode()).digest()
+    content = {
+        "name": name,
+        "mark": f"{MARK}: {UNIT},",
+        "guid": f"{{{uuid.UUID(bytes=digest[:16])}}}",
+        "dt": model.dt,
+        "ahead": ahead,
+        **_described(linear, ahead),
+    }
+    files["fmi2.c"] = _rendered("fmi2.c", **content)
+    description = _rendered("modelDescription.xml", **content)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        replacing(target) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        archive.writestr("modelDescription.xml", description, zipfile.ZIP_STORED)
+        for file, text in files.items():
+            Path(folder, file).write_text(text, encoding="utf-8")
+            archive.writestr(f"sources/{file}", text)
+        if cc := compiler():
+            place, suffix = PLATFORMS[HERE]
+            library = _compiled(cc, Path(folder), name, suffix)
+            archive.write(library, f"binaries/{place}/{library.name}")
+    return target
+
+
+def compiler() -> list[str] | None:
+    """Command of a C compiler that makes a binary for this platform, or None.
+
+    The environment variable ``CC`` names another one than cc, gcc or clang.
+    """
+    if HERE not in PLATFORMS:
+        return None
+    if named := shlex.split(os.environ.get("CC", "")):
+        return named
+    path = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    return [path] if path else None
+
+
+def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path:
+    library = folder / f"{name}{suffix}"
+    flags = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]
+    written = sorted(each.name for each in folder.glob("*.c"))
+    command = [*compiler, *flags, "-o", library.name, *written, "-lm"]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        said, failed = done.stderr, done.returncode
+    except OSError as error:
+        said, failed = str(error), 1
+    if failed:
+        raise RequestError(
+            f"the C compiler failed: {shlex.join(command)}\n{said.strip()[:500]}\nMend it, name "
+            "another one in the environment variable CC, or write the sources alone (--c)."
+        )
+    return library
+
+
+def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
+    """What the model description says beside names and numbers."""
+    signature = model.signature
+    inputs, states = signature.input_labels, signature.state_labels
+    history = signature.input_history + signature.lead_samples
+    # Before any are known, inputs and outputs are their means in training.
+    means = (signature.input_scale.centre[: len(inputs)], signature.state_scale.centre)
+    groups = [
+        [
+            {
+                "name": _part(label.name),
+                "unit": label.units,
+                "description": label.long_name,
+                "start": start,
+                "rows": rows,
+                "is_output": labels is states,
+            }
+            for label, start in zip(labels, mean.tolist(), strict=True)
+        ]
+        for labels, mean, rows in zip(
+            (inputs, states), means, (history, signature.state_samples), strict=True
+        )
+    ]
+    given, answered = groups
+    channels = [*given, *answered]
+    if ahead is not None:
+        measured = [
+            each | {"name": f"measured.{each['name']}", "is_output": False} for each in answered
+        ]
+        coming = [
+            each | {"name": f"{kind}.{each['name']}[{step}]", "start": start}
+            for kind, starts in (("ahead", means[1]), ("std", signature.state_scale.spread))
+            for step in range(1, ahead + 1)
+            for each, start in zip(answered, starts.tolist(), strict=True)
+        ]
+        channels, groups = [*given, *measured, *answered, *coming], []
+    return {
+        "version": version(),
+        "timing": timing(model, ahead is not None),
+        # Structured names are ASCII.
+        "convention": "structured" if all(c["name"].isascii() for c in channels) else "flat",
+        "channels": channels,
+        # Histories stand in the order of C: those of the states, row by row, then the inputs'.
+        "histories": [
+            (channel, row + 1)
+            for group in groups[::-1]
+            for row in range(group[0]["rows"] if group else 0)
+            for channel in group
+        ],
+        "units": sorted({label.units for label in inputs + states if label.units}),
+    }
+
+
+def _part(name: str) -> str:
+    """Part of a structured name of FMI; what is not an identifier stands between quotes."""
+    if name.isascii() and name.isidentifier():
+        return name
+    escaped = name.replace("\\", "\\\\").replace("'", "\\'")
+    return f"'{escaped}'"
