@@ -12,7 +12,7 @@ from started import started
 from tutorial_study import edit
 
 from seakeep import executor
-from seakeep.cli.study import _write_reproduction
+from seakeep.cli.judging import _write_reproduction
 from seakeep.study import StudyResult
 
 pytest.importorskip("matplotlib")
@@ -50,7 +50,7 @@ def test_each_page_of_a_reproduction_is_named_before_it_is_drawn(
         if tell:
             tell(0, 9, "figure")
 
-    monkeypatch.setattr("seakeep.cli.study.progress_bar", bar)
+    monkeypatch.setattr("seakeep.cli.judging.progress_bar", bar)
     monkeypatch.setattr("seakeep.report.sections.write_report", drawn)
     monkeypatch.setattr("seakeep.report.acts.write_reproduction", lambda *each: each[0])
     if near:

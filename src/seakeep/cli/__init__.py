@@ -12,7 +12,6 @@ from typing import Annotated
 import typer
 
 from seakeep.cli import campaigns, judging, modelling
-from seakeep.cli import study as studying
 from seakeep.cli.console import say, tell_warnings
 from seakeep.errors import SeakeepError
 
@@ -101,9 +100,9 @@ for _verb in (
     judging.compare,
     modelling.export,
     judging.check,
-    studying.study,
-    studying.report,
-    studying.reproduce,
+    judging.study,
+    judging.report,
+    judging.reproduce,
     campaigns.track,
     info,
 ):
