@@ -24,9 +24,8 @@ import xarray as xr
 
 import seakeep
 from seakeep.signals import effective_celerity, encounter_period, peak_period
-from seakeep.tank.delivery import write_record
 from seakeep.tank.instruments import record_run
-from seakeep.tank.play import check_settings, generator, play, play_run
+from seakeep.tank.play import check_settings, generator, play, play_run, write_record
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import TankSettings, default_settings
 from seakeep.waves import phase_speed, wavenumber

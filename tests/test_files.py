@@ -87,14 +87,14 @@ from seakeep.errors import SeakeepError
 from seakeep.files import write_sealed
 from seakeep.report import comparison
 from seakeep.study import store as study
-from seakeep.tank import delivery
+from seakeep.tank import play
 
 folder = Path(sys.argv[1])
 run = xr.Dataset({"heave": ("time", np.random.rand(50_000), {"units": "m"})})
 writers = {
     "model": lambda path: write_sealed(run, path, "model"),
     "forecast": lambda path: comparison.write_forecast(run, path),
-    "raw file": lambda path: delivery.write_record(run, path),
+    "raw file": lambda path: play.write_record(run, path),
     "study": lambda path: study.write_result(study.StudyResult(folder, {}, {"prepared": run})),
 }
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -331,8 +331,7 @@ def tank():
     from tank_figures import hydrodynamics_figure, realise, run_figure, tank_spectrum_figure
 
     from seakeep.signals.tracking import opencv
-    from seakeep.tank.delivery import side_view
-    from seakeep.tank.play import check_settings, play_run, truth
+    from seakeep.tank.play import check_settings, play_run, side_view, truth
     from seakeep.tank.settings import default_settings
 
     settings = default_settings()

@@ -17,7 +17,7 @@ from seakeep.signals.tracking import FLAGS
 cv2 = pytest.importorskip("cv2")
 pytest.importorskip("numba")
 
-from seakeep.tank import delivery as tank_video  # noqa: E402
+from seakeep.tank import play as tank_video  # noqa: E402
 
 cv2.setNumThreads(1)
 RATE, FRAMES = 30.0, 60

@@ -32,7 +32,7 @@ def found(folder, door):
 
     On the virtual tank's campaign file, without its raw files.
     """
-    from seakeep.tank.delivery import campaign_text
+    from seakeep.tank.play import campaign_text
     from seakeep.tank.settings import default_settings
 
     settings = default_settings()

@@ -14,7 +14,7 @@ from seakeep.study.plan import make_plan
 from seakeep.study.reproduce import ACTS, HIGH_PASS, SLOW, Size, reproduce, study_text
 
 pytest.importorskip("seakeep.tank.play")
-from seakeep.tank.delivery import campaign_text, write_record
+from seakeep.tank.play import campaign_text, write_record
 from seakeep.tank.settings import default_settings
 
 SMALL = Size(training=1, tests=2, members=2, series=4)

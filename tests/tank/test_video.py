@@ -4,9 +4,8 @@ from numpy.testing import assert_allclose
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.signals import TrackingSettings, track_video
-from seakeep.tank.delivery import PANEL_HEIGHT, pixel_of, render_side_view
 from seakeep.tank.instruments import clock_instants
-from seakeep.tank.play import play, play_run
+from seakeep.tank.play import PANEL_HEIGHT, pixel_of, play, play_run, render_side_view
 
 pytest.importorskip("cv2")
 pytest.importorskip("numba")
