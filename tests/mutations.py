@@ -102,6 +102,7 @@ CHANGES = {
         ("name, slice(first + 1, last + 1))", "name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ],
     "check/response.py": [
+        ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_that_of_python_control"),
         ('replace(alignment.settings, surge="measured")', 'replace(alignment.settings, surge="none")', "check/test_response.py::test_measured_phases_count_from_the_waves_where_the_vessel_is"),
         ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
         ("early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
@@ -179,11 +180,6 @@ CHANGES = {
         ("read *= on_grid - below", "read *= on_grid", "models/test_following.py::test_the_wave_is_read_where_the_vessel_goes"),
         ("min(max(0.0, float(computed[-1]) + still), highest)", "min(float(computed[-1]) + still, highest)", "models/test_following.py::test_a_step_is_the_equation"),
     ],
-    "core/response.py": [
-        ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_that_of_python_control"),
-        ("np.hypot(real, imag) > radius", "abs(real) > radius", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
-        ("wanted, gain = value * radius / abs(value), reach @ direction", "wanted, gain = value * radius, reach @ direction", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
-    ],
     "core/rollout.py": [
         ("gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)", "gone = ~finite.all(axis=2)", "core/test_rollout.py::test_a_window_that_was_given_up_does_not_come_back"),
         ("moved[:, : size - N] += row[:, N:]", "moved[:, : size - N] += 0.0 * row[:, N:]", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
@@ -191,6 +187,8 @@ CHANGES = {
         ("states[:number] = _forced(rows, propagator.state_input)", "states[:number] = 0.5 * _forced(rows, propagator.state_input)", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
     ],
     "core/solve.py": [
+        ("np.hypot(real, imag) > radius", "abs(real) > radius", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
+        ("wanted, gain = value * radius / abs(value), reach @ direction", "wanted, gain = value * radius, reach @ direction", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
         ("NARROW_LIMIT if is_narrow else GRAM_LIMIT", "GRAM_LIMIT", "core/test_solve.py::test_the_newest_rows_alone_are_regressed_with_less"),
         ("min(count, rank)", "min(count, rank + 1)", "core/test_fast_paths.py::test_a_rank_is_that_of_the_truncated_matrix"),
         ("if ridge < (NARROW_LIMIT if is_narrow else GRAM_LIMIT) * gram_trace(problem)", "if False", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from seakeep.core.response import clip_modes
+from seakeep.core.solve import clip_modes
 
 
 def companion(roots):

@@ -28,6 +28,12 @@ which determines H by running sums from the oldest lag. So H costs 2(channels + 
 runs), a product of that rank and one addition per entry, instead of an inversion.
 :math:`(I-\tau Z)^{-1}` sums a series over its lags; τ = −1 sums it with turning signs, which keeps
 a smooth series small, and τ = 1 one that turns its sign at every sample.
+
+Eigenvalues of :math:`\hat A` are clipped to a radius. With exact delay rows only the top block row
+of :math:`\hat A` is free: feedback through it, :math:`\hat A + E K` with E the first columns of the
+identity, moves eigenvalues and keeps the shift. Rows of K that are combinations of the left
+eigenvectors :math:`w_i^H` of some modes move these modes alone; all other eigenvalues, and the
+right eigenvectors of their modes, stay.
 """
 
 from collections.abc import Sequence
@@ -49,7 +55,6 @@ from seakeep.core.embedding import (
     primal_system,
     snapshot_gram,
 )
-from seakeep.core.response import clip_modes
 
 Method = Literal["primal", "dual", "svd"]
 
@@ -134,7 +139,7 @@ def identify(
     method : {"primal", "dual", "svd"}, optional
         Forces a form; by default shape and conditioning decide.
     radius : float, optional
-        Eigenvalues outside it are clipped (:func:`seakeep.core.response.clip_modes`).
+        Eigenvalues outside it are clipped (:func:`clip_modes`).
 
     Returns
     -------
@@ -375,3 +380,58 @@ def factorise(gram: FloatArray, ridge: float) -> FloatArray:
 def solve_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:
     """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
     return lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0].T
+
+
+def clip_modes(rows: FloatArray, radius: float) -> tuple[FloatArray, tuple[float, ...]]:
+    r"""Move the eigenvalues outside a radius onto it, with their angles, and leave all others.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (N or N(s+1), N(s+1))
+        Regressed rows of :math:`\hat A`; below them stands the exact shift.
+    radius : float
+        Largest modulus that is left.
+
+    Returns
+    -------
+    rows : ndarray
+        The rows with these eigenvalues clipped; the same array where there are none.
+    moduli : tuple of float
+        Moduli that were clipped, largest first.
+
+    Notes
+    -----
+    One real mode or one conjugate pair is moved at a time, by feedback through the direction b that
+    moves it most: with :math:`g = w^H b`, the row :math:`2 \Re(f w^H)` with
+    :math:`f = (\lambda'-\lambda)(\bar\lambda'-\lambda) / (g (\bar\lambda-\lambda))` places a pair
+    at :math:`\lambda'` and its conjugate, and :math:`w (\lambda'-\lambda)/g` a real mode.
+    """
+    count, size = rows.shape
+    a = np.concatenate([rows, np.eye(size - count, size)])
+    turned, vectors, number = linalg.schur(
+        a.T, output="real", sort=lambda real, imag=0.0: bool(np.hypot(real, imag) > radius)
+    )
+    if not number:
+        return rows, ()
+    # basis.T @ a = small @ basis.T: the left invariant subspace of these modes.
+    basis, small = vectors[:, :number], turned[:number, :number].T.copy()
+    moduli = np.sort(np.abs(np.linalg.eigvals(small)))[::-1]
+    entry = basis[:count].T
+    feedback = np.zeros((count, number))
+    for _ in range(number):
+        values, left = linalg.eig(small, left=True, right=False)
+        worst = int(np.argmax(np.abs(values)))
+        value, w = values[worst], left[:, worst].conj()
+        if abs(value) <= radius * (1.0 + 1e-9):
+            break
+        reach = w @ entry
+        direction = np.linalg.svd(np.stack([reach.real, reach.imag]))[2][0]
+        wanted, gain = value * radius / abs(value), reach @ direction
+        if value.imag == 0.0:
+            row = ((wanted - value) / gain * w).real
+        else:
+            factor = (wanted - value) * (wanted.conj() - value) / (value.conj() - value)
+            row = 2.0 * (factor / gain * w).real
+        feedback += np.outer(direction, row)
+        small += np.outer(entry @ direction, row)
+    return rows + feedback @ basis.T, tuple(float(each) for each in moduli)

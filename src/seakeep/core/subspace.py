@@ -16,9 +16,8 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.core.embedding import Delayed, TrainingWindow, lagged_response, primal_system
-from seakeep.core.response import clip_modes
 from seakeep.core.rollout import rollout
-from seakeep.core.solve import by_singular_values, ridge_path
+from seakeep.core.solve import by_singular_values, clip_modes, ridge_path
 from seakeep.errors import DataError
 
 
