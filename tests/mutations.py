@@ -252,6 +252,7 @@ CHANGES = {
         ("first + step * np.arange(count, dtype=float)", "step * np.arange(count, dtype=float)", "formats/test_read_tdms.py::test_waveforms"),
     ],
     "formats/text.py": [
+        ("column.get(column.first_valid_index())", "column[0]", "formats/test_read_text.py::test_what_is_no_table"),
         ('column.str.replace(",", ".")', "column", "formats/test_read_text.py::test_dates_count_from_the_midnight_before_the_first"),
         ("_NUMBER.match(cell) or _INSTANT.match(cell)", "_NUMBER.match(cell)", "formats/test_read_text.py::test_dates_count_from_the_midnight_before_the_first"),
         ("len(cells[at - 1]) == len(cells[first]) and", "", "formats/test_read_text.py::test_words_stand_above_the_header"),
