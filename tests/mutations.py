@@ -275,6 +275,7 @@ CHANGES = {
         ("fabs(time - state->next)", "(state->next - time)", "hosts/test_fmu.py::test_a_step_that_does_not_follow_on_the_last_is_refused"),
     ],
     "metrics.py": [
+        ('(measure, of, ("__module__", "__name__", "__qualname__", "__doc__"))', "(measure, of)", "test_arrays.py::test_every_public_function_shows_the_type_of_each_argument"),
         ("np.sqrt(pair.m.shape[-2] - 1)", "np.sqrt(pair.m.shape[-2])", "test_metrics.py::test_measures_by_hand"),
         ("own = [_block(each) for each in pairs]", "own = [max(map(_block, pairs))] * len(pairs)", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
         ("np.roll(of[0], k, axis=-1)", "of[0]", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
