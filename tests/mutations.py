@@ -487,6 +487,9 @@ CHANGES = {
     "pairing.py": [
         ("tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
     ],
+    "quality/clocks.py": [
+        ('clock.reading_error(float(group["time"][0]))', "clock.offset_error", "quality/test_checks.py::test_a_clock_is_as_uncertain_as_at_the_start_of_its_record"),
+    ],
     "quality/faults.py": [
         ("minimum=2 * REACH)", "minimum=2 * REACH + 1)", "quality/test_faults.py::test_sixteen_samples_are_enough_to_be_judged"),
         ("corner > CORNER * distance[begin:end].max()", "True", "quality/test_faults.py::test_a_model_that_is_let_go_swings_back"),

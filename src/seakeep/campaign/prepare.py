@@ -24,7 +24,7 @@ from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import lengths, parse_length, read_toml, validated
 
-FORMAT = 14
+FORMAT = 15
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 

@@ -1,5 +1,6 @@
 """Checks of time: clocks, rates and records of the loggers, the common step, the period."""
 
+from dataclasses import replace
 from statistics import median_high, median_low
 
 import numpy as np
@@ -114,11 +115,12 @@ def clocks(record: Record) -> Findings:
                 yield record.finding(ClocksKind.OTHER_RATE, label, 1 / step, rate.stated, "Hz")
         if clock.method == ASSUMED:
             yield record.finding(ClocksKind.ASSUMED_CLOCK, label)
-        if clock.offset_error > (limit := 0.25 * step) or clock.residual > 0.5 * step:
+        error, limit = clock.reading_error(float(group["time"][0])), 0.25 * step
+        if error > limit or clock.residual > 0.5 * step:
+            described = replace(clock, offset_error=error).describe()
             yield record.finding(
-                ClocksKind.UNCERTAIN_CLOCK, label, clock.offset_error, limit, "s",
-                described=clock.describe(),
-            )  # fmt: skip
+                ClocksKind.UNCERTAIN_CLOCK, label, error, limit, "s", described=described
+            )
         if abs(clock.drift) > LARGEST_DRIFT:
             drift, limit = 1e6 * clock.drift, 1e6 * LARGEST_DRIFT
             yield record.finding(ClocksKind.CLOCK_DRIFT, label, drift, limit, "1")
