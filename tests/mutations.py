@@ -57,6 +57,7 @@ CHANGES = {
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
     "campaign/settings.py": [
+        ("if given and self.drift is not None:", "if False:", "campaign/test_campaign_file.py::test_mistake"),
         ('if kind != "still")', 'if kind)', "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
     ],
     "campaign/readers.py": [
