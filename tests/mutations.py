@@ -489,6 +489,7 @@ CHANGES = {
         ("tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
     ],
     "quality/clocks.py": [
+        ('without this column" if name else', 'without this column" if not name else', "campaign/test_plausibility.py::test_a_logger_whose_times_may_count_samples"),
         ('clock.reading_error(float(group["time"][0]))', "clock.offset_error", "quality/test_checks.py::test_a_clock_is_as_uncertain_as_at_the_start_of_its_record"),
     ],
     "quality/faults.py": [

@@ -48,8 +48,8 @@ class ClocksKind(Kind):
     )
     COUNTED = (
         "counts 1, 2, 3 and states no unit: taken for seconds",
-        "If it counts samples, state sampling_rate (Hz) in [{table}] and leave time out there; if "
-        "these are seconds, state time_unit = 's' there.",
+        "If it counts samples, {away} and state sampling_rate (Hz) in [{table}]; if these are "
+        "seconds, state time_unit = 's' there.",
     )
     OTHER_RATE = "samples at {value:.5g}, by its times; {limit:g} are stated"
     ASSUMED_CLOCK = (
@@ -132,7 +132,8 @@ def rates(record: Record) -> Findings:
         rate, label = record.rates.get(name), name or "time"
         table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
-            yield record.finding(ClocksKind.COUNTED, label, table=table)
+            away = "export its file without this column" if name else "leave time out"
+            yield record.finding(ClocksKind.COUNTED, label, table=table, away=away)
         if rate and rate.assumed:
             yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 
