@@ -39,6 +39,10 @@ CHANGES = {
         ('if "range" not in kinds:', 'if kinds:', "campaign/test_drafts.py::test_guesses"),
         ('"time" in kinds_of(column) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
     ],
+    "campaign/live_chain.py": [
+        ("DAY * (seconds[before - 1] // DAY)", "0.0", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
+        ("past_midnight(seconds) / factor", "seconds / factor", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
+    ],
     "campaign/pipeline.py": [
         ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
         ("groups[name] = group.sel(", "groups[name] = group; group.sel(", "campaign/test_plausibility.py::test_faults_outside_the_span_are_none_of_the_run"),
@@ -53,6 +57,7 @@ CHANGES = {
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
     "campaign/settings.py": [
+        ("if given and self.drift is not None:", "if False:", "campaign/test_campaign_file.py::test_mistake"),
         ('if kind != "still")', 'if kind)', "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
     ],
     "campaign/readers.py": [
@@ -148,6 +153,7 @@ CHANGES = {
         ("low + (place % 1.0) * (high - low)", "low", "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
         ("h = np.where(h > 0, h, of_constant)", "h = np.where(h > 0, h, 2 * of_constant)", "statistics/test_density.py::test_a_redraw_that_is_constant_has_the_bandwidth_of_its_series_beside_a_narrow_one"),
         ("np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
+        ("reach = h[:, None] * np.sqrt(2.0)", "reach = h[:, None]", "statistics/test_density.py::test_a_constant_series_has_a_density_of_a_stated_bandwidth"),
         ("np.exp(-0.5 * (h[:, None] * angular) ** 2)", "np.exp(-((h[:, None] * angular) ** 2))", "statistics/test_density.py::test_densities_are_scipys"),
     ],
     "core/embedding.py": [
@@ -233,6 +239,7 @@ CHANGES = {
         ("first + step * np.arange(count, dtype=float)", "step * np.arange(count, dtype=float)", "formats/test_read_tdms.py::test_waveforms"),
     ],
     "formats/text.py": [
+        ("column.get(column.first_valid_index())", "column[0]", "formats/test_read_text.py::test_what_is_no_table"),
         ('column.str.replace(",", ".")', "column", "formats/test_read_text.py::test_dates_count_from_the_midnight_before_the_first"),
         ("_NUMBER.match(cell) or _INSTANT.match(cell)", "_NUMBER.match(cell)", "formats/test_read_text.py::test_dates_count_from_the_midnight_before_the_first"),
         ("len(cells[at - 1]) == len(cells[first]) and", "", "formats/test_read_text.py::test_words_stand_above_the_header"),
@@ -260,6 +267,7 @@ CHANGES = {
         ("pair.p.min(axis=-2) - pair.m.min(axis=-2)", "pair.p.min(axis=-2) - pair.m.max(axis=-2)", "test_metrics.py::test_measures_by_hand"),
         ("spread = m.std(axis=-2, ddof=1)", "spread = m.std(axis=-2, ddof=0)", "test_metrics.py::test_measures_by_hand"),
         ("total / np.maximum(count, 1)", "total / values.shape[-1]", "test_metrics.py::test_a_slack_channel_is_nan_and_left_out_of_averages"),
+        ('(measure, of, ("__module__", "__name__", "__qualname__", "__doc__"))', "(measure, of)", "test_arrays.py::test_every_public_function_shows_the_type_of_each_argument"),
         ("np.sqrt(pair.m.shape[-2] - 1)", "np.sqrt(pair.m.shape[-2])", "test_metrics.py::test_measures_by_hand"),
         ("own = [_block(each) for each in pairs]", "own = [max(map(_block, pairs))] * len(pairs)", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
         ("np.roll(of[0], k, axis=-1)", "of[0]", "test_metrics.py::test_the_bounds_of_an_error_are_those_of_its_model_whatever_stands_beside_it"),
@@ -465,6 +473,10 @@ CHANGES = {
     ],
     "pairing.py": [
         ("tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
+    ],
+    "quality/clocks.py": [
+        ('without this column" if name else', 'without this column" if not name else', "campaign/test_plausibility.py::test_a_logger_whose_times_may_count_samples"),
+        ('clock.reading_error(float(group["time"][0]))', "clock.offset_error", "quality/test_checks.py::test_a_clock_is_as_uncertain_as_at_the_start_of_its_record"),
     ],
     "quality/faults.py": [
         ("minimum=2 * REACH)", "minimum=2 * REACH + 1)", "quality/test_faults.py::test_sixteen_samples_are_enough_to_be_judged"),

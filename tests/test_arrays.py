@@ -105,6 +105,12 @@ BAD = {
 }
 
 
+def test_every_public_function_shows_the_type_of_each_argument():
+    for name, function in FUNCTIONS.items():
+        shown = inspect.signature(function).parameters
+        assert [each for each in shown.values() if each.annotation is each.empty] == [], name
+
+
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 def test_sound_arguments_pass_and_what_is_no_array_of_real_numbers_is_refused(name):
     wanted = [

@@ -183,14 +183,13 @@ def labelled(
 
         def measure(
             *,
-            predicted: Any,
-            measured: Any,
-            training_std: Any = None,
-            noise_std: Any = None,
+            predicted: npt.ArrayLike | xr.Dataset,
+            measured: npt.ArrayLike | xr.Dataset,
+            training_std: npt.ArrayLike | None = None,
+            noise_std: npt.ArrayLike | None = None,
             interval: float | None = None,
         ) -> Any:
-            of_sets = isinstance(predicted, xr.Dataset)
-            if of_sets != isinstance(measured, xr.Dataset):
+            if isinstance(predicted, xr.Dataset) != isinstance(measured, xr.Dataset):
                 raise RequestError(
                     "predicted and measured must both be Datasets or both be arrays; received "
                     f"{type(predicted).__name__} and {type(measured).__name__}."
@@ -199,7 +198,7 @@ def labelled(
                 raise RequestError(
                     f"{name} has a value at each instant, and no interval over time."
                 )
-            if not of_sets:
+            if not (isinstance(predicted, xr.Dataset) and isinstance(measured, xr.Dataset)):
                 values = _valued(of, paired(predicted, measured, training_std, noise_std), interval)
                 return values if values.ndim else values.item()
             pairs, pair = _paired(predicted, measured, training_std, noise_std)
@@ -225,8 +224,9 @@ def labelled(
             attrs = {"units": units, "long_name": name}
             return xr.DataArray(values, coords, dims, name=of.__name__, attrs=attrs)
 
-        update_wrapper(measure, of)
-        del measure.__wrapped__  # type: ignore[attr-defined]  # whose arguments are others
+        # Not its annotations: the arguments of a function of a pair are others.
+        update_wrapper(measure, of, ("__module__", "__name__", "__qualname__", "__doc__"))
+        del measure.__wrapped__  # type: ignore[attr-defined]
         return measure
 
     return decorate

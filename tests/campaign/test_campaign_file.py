@@ -52,6 +52,11 @@ MISTAKES = [
         "preparation: state only one of sampling_rate, dt; received a table with",
     ),
     (
+        "[preparation]",
+        '[instruments.mru]\nshared = ["a", "b"]\ndrift = 20\n[preparation]',
+        "instruments.mru: drift is found from shared, as offset is: leave drift out; received",
+    ),
+    (
         "span = [2, 18]",
         "span = [18, 2]",
         "runs.second.span: a span is [start, end] in seconds of the file's clock or in encounter "

@@ -1,5 +1,7 @@
 """Raw samples in service: the chain on a window that moves gives what it gives offline."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import two_loggers
@@ -94,6 +96,19 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
     for name in ("heave", "eta_fwd"):
         left = (found[name] - whole[name]).isel(time=after).std() / whole[name].std()
         assert left < 1e-3  # the memory of filters fades within some periods
+
+
+def test_seconds_of_day_go_on_counting_over_each_midnight(campaign, rows):
+    counted = rows["t"] + 2 * 86400.0 - 30.0
+    parts = np.r_[0, 500, 747:753, 800:1500:100]  # the midnight lies between two parts
+    for of_day in (np.where(rows["t"] < 20.0, counted, counted % 86400.0), counted % 86400.0):
+        whole, fallen = chain_of(campaign), chain_of(campaign)
+        first = counted[0] - of_day[0]
+        for start, stop in pairwise(parts):
+            part = {name: each[start:stop] for name, each in rows.items()}
+            expected = whole.push({"": part | {"t": counted[start:stop] - first}})
+            found = fallen.push({"": part | {"t": of_day[start:stop]}})
+            xr.testing.assert_identical(found, expected)
 
 
 def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):

@@ -146,6 +146,19 @@ def test_times_that_may_count_samples(first, tank, header, files, is_said):
     assert ("counted" in kinds(run)) is is_said
 
 
+@pytest.mark.filterwarnings("ignore:.*shows waves of")
+def test_a_logger_whose_times_may_count_samples(loggers, tmp_path):
+    path, columns = loggers().path, tank_columns()
+    del columns["Time [s]"], columns["WP fwd [mm]"]
+    edit(path, ("[instruments.mru]", "[instruments.mru]\noffset = 0"))
+    write_csv(tmp_path / "mru.csv", {"Time": np.arange(1001.0)} | columns)
+    with warned(r"mru counts 1, .* export its file without this column and state sampling_rate"):
+        read_campaign(path).prepare()
+    write_csv(tmp_path / "mru.csv", columns)
+    edit(path, ("offset = 0", "offset = 0\nsampling_rate = 50"))
+    assert "counted" not in kinds(read_campaign(path).prepare()["first"])
+
+
 def test_a_motion_from_a_column_of_waves(first):
     with warned(
         r"heave is read from the column 'WP fwd', which is called as wave probes are\. "

@@ -191,7 +191,8 @@ MISTAKES = {
     f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc":
         r"--scheduler is for ensembles, and",
     f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc":
-        r"no window of 900 steps with \d+ samples of history is free in unseen, .* most \d+",
+        r"no window of 900 steps with \d+ samples of history is free in unseen, .* most \d+ .*"
+        r"by what the others teach \(folds='run', --folds run of seakeep calibrate\)",
     f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc":
         r"--workers 2 counts processes on this machine, and --scheduler tcp://h:1 hands all",
     f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc": r"level must be between 0 and 1",

@@ -283,6 +283,8 @@ NO_TABLE = {
         "05-03T10:00:00.1 .ISO 8601., or as seconds. Or, only where no row is lost, leave time out",
     "time,heave\n2024-05-01 12:00:00.1,1\n2024-05-01 12:00:0x,2\n":
         "line 3, column 'time': '2024-05-01 12:00:0x' is not a number. Write instants as in",
+    "time,heave\n,1\n2024-05-01 12:00:00.1,2\n2024-05-01 12:00:00.2,3\n":
+        r"the times of .*run\.csv hold a value that is not finite at sample 0 \(1 in all\)",
     "time,heave\n86399.9,1\n0.6,2\n0.7,3\n0.8,3\n": r"not sorted: 0\.6 s follows 86399\.9 s",
     "t,heave,pitch\n0,1,2\n1,2,3\n2,":
         r"line 4: 2 cells where the header has 3 .*It is the last line: the file was cut off",

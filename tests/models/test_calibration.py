@@ -153,7 +153,7 @@ def assert_learnt(found, judged):
 def test_folds_are_forecast_by_what_the_other_runs_teach():
     runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b", "c"))}
     ensemble = pooled("all", runs)
-    with request_error(r"or let each run .* \(folds = 'run'\)"):
+    with request_error(r"or let each run .* \(folds='run'"):
         ensemble.calibrate(runs, steps=40)
     found = ensemble.calibrate(runs, steps=40, folds="run").calibration
     # By hand: the same settings fitted anew on the other runs, which none of them has read.

@@ -12,10 +12,12 @@ from said import warned
 from seas import sea
 
 from seakeep.quality import Finding, Record, as_json, findings_of, warn_of
+from seakeep.quality.clocks import clocks
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
 from seakeep.quality.samples import waves as waves_of
 from seakeep.quality.sensors import LATE, RUN_AWAY, compare_sensors, derivatives, redundant
+from seakeep.signals import Clock
 
 DT = 0.04
 T = DT * np.arange(3000)
@@ -45,6 +47,21 @@ def test_a_late_one():
     assert (found.unit, found.channel, found.run) == ("s", "two", "r")
     assert against(waves(-0.3))[0].value == pytest.approx(-0.3, abs=0.004)
     assert found.text.startswith("against one: lag +0.30 s (± 0.0")
+
+
+@pytest.mark.parametrize("hours", [0, 10])
+@pytest.mark.parametrize(("level", "told"), [(0.009, False), (0.012, True)])
+def test_a_clock_is_as_uncertain_as_at_the_start_of_its_record(hours, level, told):
+    # Times of day count from midnight, and 4 ppm over ten hours are 0.14 s.
+    start = 3600.0 * hours
+    group = record(DT, heave=waves()).assign_coords(time=T + start)
+    error = np.hypot(level, (start + 60.0) * 4e-6)
+    clock = Clock(0.3, 2e-6, error, 4e-6, "trigger pulses", 9, 1e-3, centre=start + 60.0)
+    found = [*clocks(Record("r", group, {"mru": group}, {"mru": clock}))]
+    if told:
+        assert found[0].value == pytest.approx(level, rel=1e-3)  # 60 s of drift add little
+        assert found[0].text.startswith("clock poorly known: +300.00 ± 12.00 ms, +2.0 ± 4.0 ppm")
+    assert len(found) == told
 
 
 def test_a_phase_that_drifts_about_zero():

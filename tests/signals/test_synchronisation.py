@@ -69,7 +69,7 @@ def test_a_shared_signal_gives_honest_errors_through_the_noise_of_both(rates, no
         reference = logger(waves(seed), rates[1], 100.0, noises[1], 50 + seed)
         clock = clock_from_shared(3 * ours[0] + 1, ours[1], *reference)
         read = clock.reading(clock.centre) - 0.3717 - (1 - 40e-6) * clock.centre
-        error = np.sqrt(clock.offset_error**2 - (clock.centre * clock.drift_error) ** 2)
+        error = clock.reading_error(clock.centre)
         assert abs(read) < worst
         misses.append((read / error, (clock.drift + 40e-6) / clock.drift_error))
     # The root mean square of 12 normalised errors is 1 ± 0.2.

@@ -53,6 +53,12 @@ def test_bins_keep_their_promise_on_any_even_grid(h, points):
     assert np.all(found >= 0)
 
 
+def test_a_constant_series_has_a_density_of_a_stated_bandwidth():
+    grid = np.r_[np.linspace(4.0, 5.0, 50), 5.5, 7.0]
+    found = kernel_density(np.full(9, 5.0), grid, 0.4)
+    assert found == pytest.approx(norm.pdf(grid, 5.0, 0.4), rel=1e-12)  # rounding
+
+
 def test_the_grid_ends_three_bandwidths_beyond_the_samples():
     grid = density_grid(NORMAL, PEAKY[:50])
     assert grid.size == 512

@@ -60,6 +60,7 @@ def test_cells_that_are_not_judged_are_left_out():
     assert low < 1.0 < high
 
 
+@pytest.mark.filterwarnings("ignore:Mean of empty")  # where the one judged is not drawn
 def test_too_few_blocks_give_no_interval_and_one_cell_is_conditioned_on():
     rng = default_rng(3)
     errors = rng.normal(1.0, 0.1, (2, 30))
@@ -67,6 +68,9 @@ def test_too_few_blocks_give_no_interval_and_one_cell_is_conditioned_on():
     assert np.isnan(two_way_interval(mean, errors, rng=rng)).all()
     assert np.isnan(two_way_interval(mean, errors[:1], rng=rng, blocks=(1, 12))).all()
     assert np.isfinite(two_way_interval(mean, errors[:1], rng=rng)).all()
+    alone = np.where(np.arange(9)[:, None] == 4, errors[0], np.nan)  # one of nine rows is judged
+    low, high = two_way_interval(lambda x: np.nanmean(x, axis=(1, 2)), alone, rng=rng)
+    assert low < errors[0].mean() < high
 
 
 def test_blocks_are_as_long_as_windows_overlap():

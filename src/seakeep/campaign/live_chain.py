@@ -20,6 +20,7 @@ from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed
+from seakeep.signals.time_axis import DAY, past_midnight
 
 STATE = "state of a live chain"
 """Kind of the files of :meth:`LiveChain.save`."""
@@ -181,7 +182,15 @@ class LiveChain:
                 "needed, a number per row each. Send NaN for a value that was lost."
             )
         name, factor = self._time[key]
-        times = np.concatenate([self._rows[key][name][-1:], arrays[name]])
+        known = self._rows[key][name]
+        times, before = np.concatenate([known, arrays[name]]), known.size
+        if np.any(np.diff(times) < 0):  # seconds of day: the rows before count on
+            seconds = times * factor
+            if before:
+                seconds[before:] += DAY * (seconds[before - 1] // DAY)
+            times = past_midnight(seconds) / factor
+            arrays[name] = times[before:]
+        times = times[max(before - 1, 0) :]
         if not np.all(np.diff(times) > 0) or not np.all(np.isfinite(times)):
             raise RequestError(
                 f"the instants of '{key}' do not increase: "

@@ -182,7 +182,7 @@ class InstrumentSettings(TimesSettings):
     """reading of its clock at reference time 0, s; beside trigger, shared or correlated, near which
     it is searched"""
     drift: Finite | None = None
-    """drift of its clock, ppm"""
+    """drift of its clock, ppm; without trigger, shared or correlated, which find it"""
     metres_per_pixel: Positive | None = None
     """of a camera, in the vessel's plane"""
     panel: Pair | None = None
@@ -195,6 +195,8 @@ class InstrumentSettings(TimesSettings):
         given = [k for k in ("trigger", "shared", "correlated") if getattr(self, k) is not None]
         if len(given) > 1:
             raise ValueError(f"state only one of {', '.join(given)} to find the clock from")
+        if given and self.drift is not None:
+            raise ValueError(f"drift is found from {given[0]}, as offset is: leave drift out")
         return self
 
 

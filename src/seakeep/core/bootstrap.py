@@ -372,7 +372,8 @@ def two_way_interval(
     lower, upper : ndarray, shape (…)
         Bounds; NaN where an axis of several cells, judged or not, holds fewer than three
         blocks, which say nothing of their spread. An axis of one cell is not redrawn: the
-        interval is then conditional on it.
+        interval is then conditional on it. So it is where one of several is judged, as where each
+        test set is judged by the one training set that leaves it out.
 
     Raises
     ------

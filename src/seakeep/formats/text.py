@@ -359,7 +359,7 @@ def _columns(path: Path, frame: pd.DataFrame, layout: _Layout) -> Columns:
         if (unit := units[i]) is not None:
             out.units[name] = unit
         column = frame[i]
-        if _INSTANT.match(str(column[0])):
+        if _INSTANT.match(str(column.get(column.first_valid_index()))):
             column, out.units[name] = _days(column), f"days since {DAY_0}"
         try:
             out.values[name] = _numbers(path, name, column, layout)

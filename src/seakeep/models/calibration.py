@@ -183,7 +183,7 @@ def calibrate(
             f"no window of {steps} steps with {history} samples of history is "
             f"free in {', '.join(cases)}, as given here: {reason}. Give fewer steps, longer parts, "
             "or runs that do not train; or let each run that trains be forecast by what the "
-            "others teach (folds = 'run')."
+            "others teach (folds='run', --folds run of seakeep calibrate)."
         )
     margin, floor, law = learn_margin(judged.values(), level, scale)
     windows = {name: len(each.starts) for name, each in judged.items()}

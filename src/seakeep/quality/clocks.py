@@ -1,5 +1,6 @@
 """Checks of time: clocks, rates and records of the loggers, the common step, the period."""
 
+from dataclasses import replace
 from statistics import median_high, median_low
 
 import numpy as np
@@ -47,8 +48,8 @@ class ClocksKind(Kind):
     )
     COUNTED = (
         "counts 1, 2, 3 and states no unit: taken for seconds",
-        "If it counts samples, state sampling_rate (Hz) in [{table}] and leave time out there; if "
-        "these are seconds, state time_unit = 's' there.",
+        "If it counts samples, {away} and state sampling_rate (Hz) in [{table}]; if these are "
+        "seconds, state time_unit = 's' there.",
     )
     OTHER_RATE = "samples at {value:.5g}, by its times; {limit:g} are stated"
     ASSUMED_CLOCK = (
@@ -114,11 +115,12 @@ def clocks(record: Record) -> Findings:
                 yield record.finding(ClocksKind.OTHER_RATE, label, 1 / step, rate.stated, "Hz")
         if clock.method == ASSUMED:
             yield record.finding(ClocksKind.ASSUMED_CLOCK, label)
-        if clock.offset_error > (limit := 0.25 * step) or clock.residual > 0.5 * step:
+        error, limit = clock.reading_error(float(group["time"][0])), 0.25 * step
+        if error > limit or clock.residual > 0.5 * step:
+            described = replace(clock, offset_error=error).describe()
             yield record.finding(
-                ClocksKind.UNCERTAIN_CLOCK, label, clock.offset_error, limit, "s",
-                described=clock.describe(),
-            )  # fmt: skip
+                ClocksKind.UNCERTAIN_CLOCK, label, error, limit, "s", described=described
+            )
         if abs(clock.drift) > LARGEST_DRIFT:
             drift, limit = 1e6 * clock.drift, 1e6 * LARGEST_DRIFT
             yield record.finding(ClocksKind.CLOCK_DRIFT, label, drift, limit, "1")
@@ -130,7 +132,8 @@ def rates(record: Record) -> Findings:
         rate, label = record.rates.get(name), name or "time"
         table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
-            yield record.finding(ClocksKind.COUNTED, label, table=table)
+            away = "export its file without this column" if name else "leave time out"
+            yield record.finding(ClocksKind.COUNTED, label, table=table, away=away)
         if rate and rate.assumed:
             yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 

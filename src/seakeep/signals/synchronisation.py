@@ -363,11 +363,9 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     def pooled(clock: Clock) -> Clock:
         if not clock.known:
             return clock
-        own = np.nan_to_num(clock.drift_error)
-        level = max(clock.offset_error**2 - (clock.centre * own) ** 2, 0.0)
         return replace(
             clock.with_drift(mean, f"drift of {len(known)} runs"),
-            offset_error=math.sqrt(level + (clock.centre * error) ** 2),
+            offset_error=math.hypot(clock.reading_error(clock.centre), clock.centre * error),
             drift_error=error,
         )
 

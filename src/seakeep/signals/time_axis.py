@@ -94,6 +94,11 @@ class Clock:
         """What this clock reads at reference times, s."""
         return self.offset + (1.0 + self.drift) * as_real(time, "the times")
 
+    def reading_error(self, time: float) -> float:
+        """Standard error of what this clock reads at a reference time, s."""
+        level = max(self.offset_error**2 - (self.centre * self.drift_error) ** 2, 0.0)
+        return math.hypot(math.sqrt(level), (time - self.centre) * self.drift_error)
+
     @property
     def known(self) -> bool:
         """Whether offset and drift were found or stated; else they are zero because none was."""
