@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from numpy.testing import assert_allclose, assert_array_equal
-from records import table
+from records import arrays_at, table
 from said import request_error
 
 import seakeep
@@ -127,8 +127,8 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     learnt = bands["learnt"]
     one = wide_of(learnt, run)
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
-    x, u = table(run, STATES), table(run, INPUTS)
-    arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
+    given = arrays_at(learnt, run, 120.0)
+    arrays = learnt.hold().forecast_arrays(*given, 30, band="calibrated")
     mean, _, _, upper = found = table(one, STATES)
     assert np.all(np.ptp(upper - mean, axis=0) > 0.01 * (upper - mean).mean(axis=0))  # no constant
     # Products of matrices of other sizes: other roundings.

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
 from numpy.testing import assert_allclose
-from records import record, table
+from records import arrays_at, record, table
 from said import request_error
 
 from seakeep import BayesianHankelDMDc, HankelDMDc, Powers, SlowSquares, Uniform, load_model
@@ -49,12 +49,11 @@ def test_the_system_is_recovered_from_runs_whose_zeros_differ():
     a = model.A[:2] * scale[:, None] / np.tile(scale, 2)
     # Exact data, through a Gram matrix.
     assert_allclose(a, np.hstack(A), rtol=0, atol=1e-6)
-    run = vessel(9, 50.0)
-    forecast = model.forecast(run, start=DT * (PERIOD + 20), steps=400)
-    (x, u), at = (table(run, names) for names in CHANNELS), PERIOD + 21
-    found = table(forecast, CHANNELS[0])
-    assert_allclose(found, x[at : at + 400], rtol=0, atol=1e-6)
-    values = model.forecast_arrays(x[:at], u[:at], u[at:], 400)
+    run, start = vessel(9, 50.0), DT * (PERIOD + 20)
+    forecast = model.forecast(run, start, 400)
+    found, at = table(forecast, CHANNELS[0]), PERIOD + 21
+    assert_allclose(found, table(run, CHANNELS[0])[at : at + 400], rtol=0, atol=1e-6)
+    values = model.forecast_arrays(*arrays_at(model, run, start), 400)
     assert_allclose(values, found, rtol=0, atol=1e-9)
 
 

@@ -7,7 +7,7 @@ import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from records import record, table
+from records import arrays_at, record, table
 from said import data_error, warned
 from scipy import stats
 
@@ -52,17 +52,16 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     wanted[[0, 2, 3]] += moved  # all but the standard deviation
     close = {"rtol": 0, "atol": 1e-12}  # rounding of the sums
     assert_allclose(table(centred.forecast_summary(unseen, 65.0, 120), STATES), wanted, **close)
-    x, u = table(unseen, STATES), table(unseen, INPUTS)
-    now = round(65.0 / DT) + 1
-    from_arrays = centred.hold().forecast_arrays(x[:now], u[:now], u[now:], 120)
+    x, u, ahead = arrays_at(centred, unseen, 65.0)
+    from_arrays = centred.hold().forecast_arrays(x, u, ahead, 120)
     assert_allclose(from_arrays[:4], wanted, **close)
     live = centred.live()
-    for at in range(now):
-        live.step(u[at], x[at])
-    mean, std, *_ = table(live.forecast(120, u[now:]), STATES)
+    for sample in zip(u, x, strict=True):
+        live.step(*sample)
+    mean, std, *_ = table(live.forecast(120, ahead), STATES)
     assert_allclose(mean, expected, **close)
     one_step = table(single.forecast(unseen, 64.6, 1), STATES)[0]
-    assert_allclose(live.innovation, x[now - 4] - one_step, **close)  # three wait for waves ahead
+    assert_allclose(live.innovation, x[-4] - one_step, **close)  # three wait for waves ahead
     both = np.hypot(wanted[1], live.errors.at(np.arange(1, 121)))  # of members, and of any model
     assert_allclose(std, both, rtol=1e-9)
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from drifting import DT, FOLLOWED, INPUTS, drifting_run
 from numpy.testing import assert_allclose
-from records import table
+from records import arrays_at, table
 from said import data_error
 from xarray.testing import assert_identical
 
@@ -89,16 +89,16 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     several = model.forecast_windows(run, [START * DT, 50.0], STEPS)
     assert_allclose(table(several, STATES)[0], table(expected, STATES), **close)
     carried = reads_surge(model)
-    x, u = table(run, STATES), table(model.aligned_inputs(run) if carried else run, INPUTS)
     if carried:  # as a whole record, and not up to the end of the forecast
-        close["atol"] = 1e-6
-    arrays = model.forecast_arrays(x[: START + 1], u[: START + 1], u[START + 1 :], STEPS)
+        run, close["atol"] = run.assign(model.aligned_inputs(run)), 1e-6
+    x, u, ahead = arrays_at(model, run, START * DT)
+    arrays = model.forecast_arrays(x, u, ahead, STEPS)
     assert_allclose(arrays, table(expected, STATES), **close)
     if not carried:
         live = model.live(like=run)
-        for at in range(START + 1):
-            live.step(u[at], x[at])
-        served = live.forecast(STEPS, u[START + 1 :]).isel(statistic=0)
+        for sample in zip(u, x, strict=True):
+            live.step(*sample)
+        served = live.forecast(STEPS, ahead).isel(statistic=0)
         assert_allclose(table(served, STATES), table(expected, STATES), **close)
 
 
