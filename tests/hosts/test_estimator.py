@@ -13,7 +13,6 @@ from records import table
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
-from seakeep.models import Live
 from seakeep.models.growth import LeadErrors
 from seakeep.models.validity import Validity
 from seakeep.signals.prediction import foresee
@@ -38,13 +37,6 @@ def sources(model, tmp_path_factory):
 @pytest.fixture(scope="module")
 def library(sources):
     return compiled.library(sources)
-
-
-@pytest.fixture
-def errors_of_training(monkeypatch):
-    """The band of Python is not widened outside the training, as that of C is not."""
-    monkeypatch.setattr(Live, "conditions", None)
-    monkeypatch.setattr(Live, "consistency_by_state", np.ones((2, 1)))
 
 
 def built(model, folder, **settings):
