@@ -15,7 +15,6 @@ from seakeep.models import Live
 
 DT, PERIOD = 0.1, 8  # s, samples
 STATES, INPUTS = ["surge", "load"], ["eta", "wave probe"]
-POWERS = (Powers("eta", (2,)),)
 OBSERVABLES = (
     SlowSquares(("eta", "wave probe"), orders=(0, 1, 2), lags=(0, 1), period=PERIOD * DT),
     Powers("eta"),
@@ -75,7 +74,7 @@ def cases(drifts, drift):
         "full": HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES),
         "short": HankelDMDc(2, 4, 1e-3, memory=21, delay_rows="exact", readouts={"load": "auto"}),
         "arx": ARX(0, 0),
-        "powers": HankelDMDc(3, 6, 1.0, observables=POWERS),
+        "powers": HankelDMDc(3, 6, 1.0, observables=[Powers("eta", (2,))]),
     }
     models = {name: spec.fit(runs, STATES, INPUTS) for name, spec in specs.items()}
     autonomous, short = HankelDMDc(4, 0, 1.0, delay_rows="exact"), models["short"]

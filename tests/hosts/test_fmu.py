@@ -178,7 +178,6 @@ def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samp
     )
     live = model.live()
     expected = [live.step(*row) for row in zip(u, y, strict=True)]
-    found = np.stack([result[name] for name in model.states], axis=1)
-    assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)
+    assert_allclose(result[model.states].tolist()[1:], expected, rtol=1e-10, atol=1e-10)
     expected = table(live.forecast(3), model.states)[:2].ravel()
     assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)
