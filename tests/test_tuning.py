@@ -90,8 +90,7 @@ def tuned(before, spec, varied, period=None):
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
-    chosen = {"bow": "wave", "a": "auto"}
-    spec = replace(SPEC, ridge=1e-3, lead=3, readouts=chosen)
+    spec = replace(SPEC, ridge=1e-3, lead=3, readouts={"bow": "wave", "a": "auto"})
     before = """[model]
 ridge = 1  # as it was
 # of the model
@@ -210,8 +209,7 @@ def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_w
     }
     assert "one period" not in text
     # A length in periods is as exact as the samples that it stands for; samples stay samples.
-    odd = replace(spec, input_delays=1234)
-    text = tuned(before, odd, ["input_delays"], 31.37)
+    text = tuned(before, replace(spec, input_delays=1234), ["input_delays"], 31.37)
     assert round(float(tomllib.loads(text)["model"]["input_delays"].split()[0]) * 31.37) == 1234
     text = tuned_campaign(before.replace('"1 T"', "3"), None, spec, ["lead"], None, 20.0)
     assert tomllib.loads(text)["model"]["lead"] == 15
@@ -223,30 +221,26 @@ def search(given, **more):
 
 def test_a_search_that_was_interrupted_goes_on(tmp_path):
     kept = tmp_path / "kept.json"
-    done = []
 
     def stop(number, total, what):
-        done.append(number)
         if number == 2:
             raise KeyboardInterrupt
 
-    more = {"resume": kept}
     with pytest.raises(KeyboardInterrupt):
-        search(runs(), progress=stop, **more)
+        search(runs(), progress=stop, resume=kept)
     assert len(json.loads(kept.read_text())["scores"]) == 2
     counted = []
-    again = search(runs(), progress=lambda *each: counted.append(each), **more)
+    again = search(runs(), progress=lambda *each: counted.append(each), resume=kept)
     assert len(counted) == 1 + 3  # of three folds, and the rest of λ in all
-    whole = search(runs())
-    assert again.table.identical(whole.table)
+    assert again.table.identical(search(runs()).table)
     shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
     longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
     for others in (runs(2), shifted, longer):  # the last two hold the same values
         with request_error("keeps scores of other runs or settings"):
-            search(others, **more)
+            search(others, resume=kept)
     kept.write_text("[]")
     with request_error("keeps no scores of a search"):
-        search(runs(), **more)
+        search(runs(), resume=kept)
 
 
 def test_a_search_reads_nothing_after_the_stop():

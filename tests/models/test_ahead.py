@@ -81,8 +81,7 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
 
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     ensemble = few(n_members=3, lead=LEAD).fit(drifts, STATES, INPUTS)
-    last = reads_until(ensemble) - 4
-    short = unplaced(up_to(drift, last))
+    short = unplaced(up_to(drift, reads_until(ensemble) - 4))
     members = ensemble.forecast(short, START, STEPS, ahead="predict")
     words, since = (members.attrs[key] for key in ("status", "input_predicted_from"))
     assert since == pytest.approx(float(members.time[STEPS - 4]))
@@ -159,8 +158,7 @@ def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     parts = np.full((3, 1, 1, 9, 1), -3.0)
     parts[lost, ..., -1, :] = np.nan
     weigh(parts, 9.0, 3)
-    expected = [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan]
-    assert_allclose(parts[0, 0, 0, :, 0], expected)
+    assert_allclose(parts[0, 0, 0, :, 0], [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan])
 
 
 def test_a_member_whose_departure_is_lost_counts_with_the_others():
@@ -181,10 +179,8 @@ def test_a_sea_that_departs_from_training_is_forecast_on():
 
 
 def test_errors_of_several_models_are_known_as_far_as_those_of_any():
-    parts = [
-        LeadErrors(n * np.eye(1), np.array(x)[:, None]) for n, x in ((1, [3.0]), (3, [1, 1, 4.0]))
-    ]
-    both = LeadErrors.together(parts)
+    given = (1, [[3.0]]), (3, [[1.0], [1.0], [4.0]])
+    both = LeadErrors.together([LeadErrors(n * np.eye(1), np.array(x)) for n, x in given])
     assert_allclose(both.residual, [[2.0]])
     assert_allclose(both.rms[:, 0] ** 2, [5.0, 5.0, 16.0])  # and never fall
 
@@ -211,5 +207,4 @@ def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, 
     assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
     windows = model.forecast_windows(short, [10.0, start], steps, ahead="predict")
     whole = model.forecast(drift, 10.0, steps)  # all waves of that window were measured
-    both = np.stack([table(whole, STATES), found])
-    assert_allclose(table(windows, STATES), both, rtol=0, atol=1e-9)
+    assert_allclose(table(windows, STATES), [table(whole, STATES), found], rtol=0, atol=1e-9)

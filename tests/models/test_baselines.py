@@ -77,8 +77,7 @@ def test_fir_finds_a_known_impulse_response():
     heave, pitch = (np.r_[0.0, np.convolve(u, h)[:1999]] for h in response)
     run = record(DT, heave=heave, pitch=pitch, eta=u)
     model = FIR(input_delays=15, ridge=0.0, standardize=False).fit(run, STATES, ["eta"])
-    found = model.coefficients[:, 2:]
-    assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
+    assert_allclose(model.coefficients[:, 2:], np.c_[response, np.zeros((2, 4))], atol=1e-10)
     assert model.spectral_radius == 0.0
     with request_error(r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
@@ -127,5 +126,4 @@ def test_a_subspace_model_without_inputs_continues_the_states():
     swing = np.sin(2 * np.pi * np.arange(400) / 25)
     run = record(DT, {}, heave=swing)
     model = Subspace(6, 0, order=2, ridge=0.0).fit(run, ["heave"], [], stop=19.9)
-    forecast = model.forecast(run, start=25.0, steps=40)
-    assert_allclose(forecast["heave"], swing[251:291], atol=1e-4)
+    assert_allclose(model.forecast(run, start=25.0, steps=40)["heave"], swing[251:291], atol=1e-4)

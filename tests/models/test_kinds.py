@@ -103,6 +103,5 @@ lead = 0
     written = tuned_campaign(text, None, spec, ["kind"], "recommended", 16.0)
     table = tomllib.loads(written)["model"]
     assert {"preset", "alignment"}.isdisjoint(table)
-    settings = ModelSettings(**table)
-    again = resolve_model(settings, 1.6, 0.1, aligned=True).spec
+    again = resolve_model(ModelSettings(**table), 1.6, 0.1, aligned=True).spec
     assert replace(again, ridge=spec.ridge) == again == spec

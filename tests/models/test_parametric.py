@@ -74,8 +74,7 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
 def test_windows_of_several_runs_take_the_value_of_each(model):
     runs = {"shallow": vessel(0.2, 5), "deep": vessel(0.9, 6)}
     places = [("deep", 5.0), ("shallow", 6.0), ("deep", 7.0)]
-    windows = read_groups(model.signature, runs, [(places, 50)])
-    together = model.free_runs(windows)[0][0]
+    together = model.free_runs(read_groups(model.signature, runs, [(places, 50)]))[0][0]
     for (name, start), values in zip(places, together, strict=True):
         alone = model.forecast(runs[name], start, 50)
         # Windows side by side are summed in another order.

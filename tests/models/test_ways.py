@@ -44,8 +44,7 @@ VARIANTS = {
 
 
 def settings(key):
-    shared = {"delay_rows": "exact", "ridge_scale": "per_snapshot", "window": 900}
-    return shared | VARIANTS[key]
+    return {"delay_rows": "exact", "ridge_scale": "per_snapshot", "window": 900} | VARIANTS[key]
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +91,7 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     if carried:  # as a whole record, and not up to the end of the forecast
         run, close["atol"] = run.assign(model.aligned_inputs(run)), 1e-6
     x, u, ahead = arrays_at(model, run, START * DT)
-    arrays = model.forecast_arrays(x, u, ahead, STEPS)
-    assert_allclose(arrays, table(expected, STATES), **close)
+    assert_allclose(model.forecast_arrays(x, u, ahead, STEPS), table(expected, STATES), **close)
     if not carried:
         live = model.live(like=run)
         for sample in zip(u, x, strict=True):
@@ -126,8 +124,7 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
         if model.signature.input_map.follows is None and not spec.observables:
             # Places and observables are learnt once for all members.
             assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
-    again = load_model(ensemble.save(tmp_path / "e.nc"))
-    for same in (again, ensemble.hold()):
+    for same in (load_model(ensemble.save(tmp_path / "e.nc")), ensemble.hold()):
         assert_identical(forecast_of(same, run), found)
 
 
