@@ -5,6 +5,7 @@ import signal as signals
 
 import numpy as np
 import pytest
+from drifting import drifting_run
 from hypothesis import HealthCheck, settings
 from records import record
 from scipy import signal
@@ -56,6 +57,17 @@ def make_run():
 @pytest.fixture
 def run():
     return vessel_run()
+
+
+@pytest.fixture(scope="session")
+def drifts():
+    """Runs of training of a vessel that drifts; tests change copies of them."""
+    return [drifting_run(seed) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="session")
+def drift():
+    return drifting_run(7)
 
 
 @pytest.fixture

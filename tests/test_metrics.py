@@ -147,8 +147,7 @@ def test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says(white,
         error = autoregression(rng, 400)[:, None]
         if white:
             error = rng.standard_normal((400, 1)) / np.sqrt(1 - 0.9**2)
-        predicted = measured + truth * error
-        pair = both(predicted, measured)
+        pair = both(measured + truth * error, measured)
         low, high = metrics.anrmse(**pair, interval=0.95)
         assert low < metrics.anrmse(**pair) < high
         inside += low <= truth <= high
@@ -237,8 +236,7 @@ def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
     measured = np.tile([[1.0, 1.0], [-1.0, -1.0]], (50, 1))
     spread = measured.std(axis=0, ddof=1)
     for part, slack in ((0.49, False), (0.51, True)):
-        pair = both(measured, measured)
-        found = metrics.is_slack(**pair, noise_std=np.sqrt(part) * spread)
+        found = metrics.is_slack(**both(measured, measured), noise_std=np.sqrt(part) * spread)
         assert_array_equal(found, [slack, slack])
     noisy = labelled(measured, noise_std=0.8)  # stated with the measurement
     assert all(metrics.is_slack(predicted=labelled(measured), measured=noisy).values())

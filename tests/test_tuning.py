@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from free_runs import loop_score
+from free_runs import held_out_scores
 from said import request_error
 from squared import INPUTS, PERIOD, STATES, runs
 
@@ -32,8 +32,11 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
     """The third run repeats the waves of the first, a little higher and shorter."""
     first, second, _ = runs().values()
     third = first.isel(time=slice(-40)).map(lambda x: 1.02 * x, keep_attrs=True)
-    seas = {"first": (first, "calm"), "second": (second, "rough"), "third": (third, "calm")}
-    given = {name: run.assign_attrs(sea_state=sea) for name, (run, sea) in seas.items()}
+    seas = {"first": "calm", "second": "rough", "third": "calm"}
+    given = {
+        name: run.assign_attrs(sea_state=sea)
+        for (name, sea), run in zip(seas.items(), (first, second, third), strict=True)
+    }
     powers = seakeep.Powers("eta", (2,))
     spec = replace(SPEC, lead=4, observables=(powers,), centre=centre)
     result = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds)
@@ -41,16 +44,13 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
     assert words in result.describe()
     assert ("held out with each" in result.describe()) == (folds != "run")
     assert set(table["observables"].values.tolist()) == {"none", "powers"}
-    steps, first = 15 * PERIOD, spec.input_delays + centre
+    first, groups = spec.input_delays + centre, None if folds == "run" else seas
     for trial in range(0, table.sizes["trial"], 4):
-        row, found = table.isel(trial=trial), []
+        row = table.isel(trial=trial)
         chosen = (powers,) if row["observables"] == "powers" else ()
         settings = {"ridge": float(row["ridge"]), "ridge_scale": "per_snapshot"}
         plain = replace(spec, observables=chosen, **settings)
-        for run in given.values():
-            key = (lambda r: r.attrs["sea_state"]) if folds != "run" else id
-            model = plain.fit([r for r in given.values() if key(r) != key(run)], STATES, INPUTS)
-            found.append(loop_score(model, run, STATES, steps, first))
+        found = held_out_scores(plain, given, STATES, INPUTS, 15 * PERIOD, first, groups)
         # The house rule for results; but powers are bounded by the spread of all runs there, and
         # by that of those that train here.
         tolerance = 1e-3 if chosen else 1e-10
@@ -90,8 +90,7 @@ def tuned(before, spec, varied, period=None):
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
-    chosen = {"bow": "wave", "a": "auto"}
-    spec = replace(SPEC, ridge=1e-3, lead=3, readouts=chosen)
+    spec = replace(SPEC, ridge=1e-3, lead=3, readouts={"bow": "wave", "a": "auto"})
     before = """[model]
 ridge = 1  # as it was
 # of the model
@@ -210,8 +209,7 @@ def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_w
     }
     assert "one period" not in text
     # A length in periods is as exact as the samples that it stands for; samples stay samples.
-    odd = replace(spec, input_delays=1234)
-    text = tuned(before, odd, ["input_delays"], 31.37)
+    text = tuned(before, replace(spec, input_delays=1234), ["input_delays"], 31.37)
     assert round(float(tomllib.loads(text)["model"]["input_delays"].split()[0]) * 31.37) == 1234
     text = tuned_campaign(before.replace('"1 T"', "3"), None, spec, ["lead"], None, 20.0)
     assert tomllib.loads(text)["model"]["lead"] == 15
@@ -223,30 +221,26 @@ def search(given, **more):
 
 def test_a_search_that_was_interrupted_goes_on(tmp_path):
     kept = tmp_path / "kept.json"
-    done = []
 
     def stop(number, total, what):
-        done.append(number)
         if number == 2:
             raise KeyboardInterrupt
 
-    more = {"resume": kept}
     with pytest.raises(KeyboardInterrupt):
-        search(runs(), progress=stop, **more)
+        search(runs(), progress=stop, resume=kept)
     assert len(json.loads(kept.read_text())["scores"]) == 2
     counted = []
-    again = search(runs(), progress=lambda *each: counted.append(each), **more)
+    again = search(runs(), progress=lambda *each: counted.append(each), resume=kept)
     assert len(counted) == 1 + 3  # of three folds, and the rest of λ in all
-    whole = search(runs())
-    assert again.table.identical(whole.table)
+    assert again.table.identical(search(runs()).table)
     shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
     longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
     for others in (runs(2), shifted, longer):  # the last two hold the same values
         with request_error("keeps scores of other runs or settings"):
-            search(others, **more)
+            search(others, resume=kept)
     kept.write_text("[]")
     with request_error("keeps no scores of a search"):
-        search(runs(), **more)
+        search(runs(), resume=kept)
 
 
 def test_a_search_reads_nothing_after_the_stop():

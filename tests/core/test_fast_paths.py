@@ -13,8 +13,6 @@ from numpy.testing import assert_allclose
 from seakeep.core import rollout
 from seakeep.core.embedding import TrainingWindow, gram_trace
 
-ROLLOUT = sys.modules["seakeep.core.rollout"]
-
 # Sums of at most a few hundred products of order one: 1e-12 is a thousand roundings.
 TIGHT = 1e-12
 # The house rule for results; the condition number here is below 1e4.
@@ -43,8 +41,7 @@ def problems(draw):
 @given(problems())
 def test_the_trace_is_the_sum_of_squares(problem):
     regressors, _ = problem.matrices()
-    found = gram_trace(problem.delayed)
-    assert found == pytest.approx(np.sum(regressors**2), rel=TIGHT)
+    assert gram_trace(problem.delayed) == pytest.approx(np.sum(regressors**2), rel=TIGHT)
 
 
 @given(problems(), st.floats(0.5, 200.0), st.sampled_from(["all rows", "newest", "a filter"]))
@@ -58,9 +55,8 @@ def test_every_form_gives_the_papers_formula(problem, ridge, kind):
     plain = regressors @ regressors.T + ridge * np.eye(len(regressors))
     expected = np.linalg.solve(plain, regressors @ targets.T).T
     for method in ("primal", "dual", "svd", None):
-        options = {"all_rows": all_rows, "method": method, "state_delays": delays}
-        found = problem.solved(ridge, **options).coefficients
-        assert_allclose(found, expected, atol=RESULT)
+        found = problem.solved(ridge, all_rows=all_rows, method=method, state_delays=delays)
+        assert_allclose(found.coefficients, expected, atol=RESULT)
 
 
 @given(problems(), st.integers(1, 9))
@@ -114,7 +110,7 @@ def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
     options = {"direct": direct} if direct.shape[2] else {}
     extended = histories[:, ::-1].reshape(len(histories), -1)
     embedded = [inputs[:, z - lag : z - lag + steps] for lag in range(z + 1)]
-    with patch.object(ROLLOUT, "PIECE", piece):
+    with patch.object(sys.modules["seakeep.core.rollout"], "PIECE", piece):
         found = [
             rollout(a[:rows], b[:rows], start, series, n_states=N, **options)
             for start, series in ((histories, driving), (extended, np.concatenate(embedded, 2)))

@@ -39,8 +39,7 @@ def test_it_is_the_textbook_filter_with_rows_missing():
         textbook.predict()
         seen = np.flatnonzero(np.isfinite(y))
         if seen.size:
-            rows = np.eye(N, SIZE, SIZE - N)[seen]
-            textbook.update(y[seen], R=np.diag(noise[seen]), H=rows)
+            textbook.update(y[seen], R=np.diag(noise[seen]), H=np.eye(N, SIZE, SIZE - N)[seen])
         # Hundreds of products of numbers of order one.
         assert_allclose(state, textbook.x, rtol=0, atol=1e-10)
         assert_allclose(ours.covariance, textbook.P, rtol=0, atol=1e-10)

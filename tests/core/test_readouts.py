@@ -14,7 +14,7 @@ def motions_and_wave(seed=0, count=4000):
 
 
 def test_features_are_those_of_the_recipe():
-    values = [np.array([1.5]), np.array([-2.0]), np.array([1.25]), np.array([-3.0])]
+    values = np.array([[1.5], [-2.0], [1.25], [-3.0]])
     found = np.ravel(features(values, np.array([-1.0, 2.0])))
     expected = [
         *(1.5, -2.0, 2.5, 0.0),  # motions and hinges

@@ -1,4 +1,4 @@
-"""The score of free runs by a plain loop of forecasts."""
+"""Scores of free runs by plain loops of fits and forecasts."""
 
 import numpy as np
 
@@ -14,3 +14,14 @@ def loop_score(model, run, states, steps, first):
         found = metrics.nrmse(predicted=forecast, measured=measured)
         errors += [min(float(found[state]), 1.0) for state in states]
     return np.mean(errors)
+
+
+def held_out_scores(spec, runs, states, inputs, steps, first, groups=None):
+    """Scores of runs by models that the others teach, or those of other groups."""
+    groups = groups or {name: name for name in runs}
+    found = []
+    for name, run in runs.items():
+        others = [runs[key] for key in runs if groups[key] != groups[name]]
+        model = spec.fit(others, states, inputs)
+        found.append(loop_score(model, run, states, steps, first))
+    return found

@@ -1,4 +1,4 @@
-"""An oscillator whose law is known."""
+"""Runs whose law is known."""
 
 from dataclasses import dataclass
 
@@ -35,3 +35,14 @@ class Oscillator:
         *_, state = signal.dlsim((*self.system, self.dt), force, x0=2 * rng.standard_normal(2))
         attrs = {"encounter_period": 3.0}
         return record(self.dt, attrs, heave=state[:, 0], heave_rate=state[:, 1], eta_fwd=force)
+
+
+def arx_run(seed, a, b, samples, period, noise=0.0):
+    """Heave x(k + 1) = a · (x(k), x(k − 1), …) + b · (u(k), …) of a white wave u, by 0.1 s.
+
+    It is measured with a white noise of this part of its standard deviation.
+    """
+    eta, rest = np.random.default_rng(seed).standard_normal((2, samples))
+    heave = signal.lfilter([0.0, *b], [1.0, *np.negative(a)], eta)
+    attrs = {"encounter_period": period}
+    return record(0.1, attrs, heave=heave + noise * heave.std() * rest, eta=eta)

@@ -22,6 +22,13 @@ def table(run, names):
     return np.stack([run[name].values for name in names], axis=-1)
 
 
+def arrays_at(model, run, start):
+    """States and inputs up to a start, and the inputs after it, as `forecast_arrays` takes them."""
+    now = round(start / model.dt) + 1
+    x, u = table(run, model.states), table(run, model.inputs)
+    return x[:now], u[:now], u[now:]
+
+
 def rms(values):
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

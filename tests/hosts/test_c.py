@@ -88,8 +88,7 @@ def test_a_start_from_what_is_not_finite_is_refused(library, cases):
     run = Host(library, "short", 2)
     gap = case.x_history.copy()
     gap[0, 1] = np.nan
-    history = pointer(case.u[: case.rows])
-    assert run.start(run.memory, pointer(gap), history) == REFUSED
+    assert run.start(run.memory, pointer(gap), pointer(case.u[: case.rows])) == REFUSED
     assert not any(run.memory)
 
 

@@ -61,8 +61,7 @@ def test_an_estimator_knows_the_noise_and_the_roles_of_the_command(make_run, run
 def test_an_ensemble_is_no_estimator_nor_is_a_member(make_run, run):
     ensemble = few().fit(make_run(), ["heave"], ["eta_fwd"])
     for more in ("", " --member 0"):
-        said = run(ensemble, f"--c . --estimator{more}", 2)
-        assert "Fit a single model of the same runs" in said
+        assert "Fit a single model of the same runs" in run(ensemble, f"--c . --estimator{more}", 2)
 
 
 def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(cases):

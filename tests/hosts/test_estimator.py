@@ -13,7 +13,6 @@ from records import table
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
-from seakeep.models import Live
 from seakeep.models.growth import LeadErrors
 from seakeep.models.validity import Validity
 from seakeep.signals.prediction import foresee
@@ -41,10 +40,9 @@ def library(sources):
 
 
 @pytest.fixture
-def errors_of_training(monkeypatch):
-    """The band of Python is not widened outside the training, as that of C is not."""
-    monkeypatch.setattr(Live, "conditions", None)
-    monkeypatch.setattr(Live, "consistency_by_state", np.ones((2, 1)))
+def exact(library, model):
+    """Estimators in C and in Python."""
+    return Estimator(library, "exact"), model.live()
 
 
 def built(model, folder, **settings):
@@ -143,8 +141,8 @@ def test_far_from_the_mean_of_training_a_forecast_lasts_as_in_the_live_model(
 
 
 @pytest.mark.usefixtures("errors_of_training")
-def test_what_jumps_is_lost_as_in_the_live_model(library, model, make_run):
-    live, found = model.live(), Estimator(library, "exact")
+def test_what_jumps_is_lost_as_in_the_live_model(exact, model, make_run):
+    found, live = exact
     (u, y), jumped = values(make_run(COUNT, 5), model), []
     far = 1e3 * y.std(axis=0)
     y[15], y[420], y[500:503] = y[15] + far, y[420] + far, y[500:503] + far
@@ -172,25 +170,20 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     assert_allclose(found.forecast(30, plan)[1], expected, rtol=1e-7, atol=1e-9)
 
 
-def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(library, model, make_run, tmp_path):
-    wave = (Estimator(library, "exact"), model.live())
+def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(exact, model, make_run, tmp_path):
     constant = beside_a_constant(model, tmp_path)
     u, y = values(make_run(COUNT, 5), model)
-    for at in range(300):
-        for found, live in (wave, constant):
+    for (found, live), outside in ((exact, Validity.HEIGHT | Validity.STEEPNESS), (constant, 0)):
+        for at in range(300):
             found.beside(live, u[at] * [1, 3], y[at])
-    outside = [found.validity for found, _ in (wave, constant)]
-    assert outside == [live.conditions.validity for _, live in (wave, constant)]
-    assert outside[0] & Validity.HEIGHT
-    assert outside[1] == 0
-    for found, live in (wave, constant):
+        assert found.validity == live.conditions.validity == outside
         for at in range(300):
             found.beside(live, u[at] + [0, 30], y[at])
         assert found.validity & live.conditions.validity & Validity.MEAN
 
 
-def test_a_mean_is_judged_over_two_periods_or_more(library, model, make_run):
-    found, live = Estimator(library, "exact"), model.live()
+def test_a_mean_is_judged_over_two_periods_or_more(exact, model, make_run):
+    found, live = exact
     u, y = values(make_run(COUNT, 5), model)
     for at in range(least := 8 * live.equations["gap"]):
         found.beside(live, u[at] + [0, 30], y[at])
@@ -206,12 +199,12 @@ def tone():
 
 
 @pytest.mark.parametrize("record", [np.full(8, 0.25), tone()])  # of 0.25 no rounding hides 0/0
-def test_a_record_that_stands_still_or_whose_order_is_half_is_predicted_to(library, model, record):
-    live, found = model.live(), Estimator(library, "exact")
+def test_a_record_that_stands_still_or_whose_order_is_half_is_predicted_to(exact, record):
+    found, live = exact
     for at, wave in enumerate(np.append(record, np.full(4, np.nan))):
         found.beside(live, np.full(2, wave), np.full(2, 0.1 * at))
-    last = found.beside(live, np.zeros(2), np.full(2, np.nan))  # reads what was predicted
-    assert_allclose(*last, rtol=0, atol=1e-12)
+    # Which reads what was predicted.
+    assert_allclose(*found.beside(live, np.zeros(2), np.full(2, np.nan)), rtol=0, atol=1e-12)
 
 
 def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
@@ -272,11 +265,11 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_pat
     ):
         found, live = Estimator(library, "rom"), model.live()
         u, y = zero + table(case.run, model.inputs), table(case.run, model.states)
+        y[:, model.states.index("surge")] += away
         if slow:  # a swell of 0.24 Hz
             u[:] = 0.02 * np.sin(0.15 * np.arange(len(u)))[:, None]
         for at in range(300):
-            place = y[at] + away * (np.array(model.states) == "surge")
-            found.beside(live, factor * u[at], place)
+            found.beside(live, factor * u[at], y[at])
         validity = live.conditions.validity
         assert found.validity == validity
         assert bool(validity) == ((factor, slow, away, zero) != still)

@@ -37,8 +37,7 @@ def test_a_mat_file_with_observables_computes_the_forecast(cases, tmp_path, name
     case = cases[name]
     content = io.loadmat(case.model.to_mat(tmp_path / "rom.mat"))
     assert content["Lead"].item() == case.model.lead_samples
-    inputs = [str(each[0]) for each in content["InputName"][:, 0]]
-    assert inputs == case.model.regressors
+    assert [each[0] for each in content["InputName"][:, 0]] == case.model.regressors
     assert ("Function" in content) == (name != "arx")
     r, z, lead = case.u, case.model.input_delays, content["Lead"].item()
     if name != "arx":
@@ -70,9 +69,8 @@ def test_the_error_of_a_truncated_system_stays_below_its_bound(make_run, tmp_pat
     )
     assert small["A"].shape == (6, 6)
     spreads = model.state_scale.spread[:, None] / model.signature.input_scale.spread
-    frequencies = np.linspace(0, np.pi, 400)
     errors = []
-    for omega in frequencies:
+    for omega in np.linspace(0, np.pi, 400):
         gains = [
             m["C"] @ np.linalg.solve(np.exp(1j * omega) * np.eye(len(m["A"])) - m["A"], m["B"])
             for m in (whole, small)

@@ -33,6 +33,5 @@ def test_steps_one_after_the_other_are_the_horizon(name, cases, tmp_path):
     case = cases[name]
     graph, history = session(case.model, tmp_path / "m.onnx"), case.x_history
     for step, expected in enumerate(case.expected):
-        u = case.u[step : step + case.rows + 1]
-        found, history = graph.run(None, given(case, history, u))
+        found, history = graph.run(None, given(case, history, case.u[step : step + case.rows + 1]))
         assert_allclose(found, expected[None], rtol=1e-12, atol=1e-12)

@@ -7,7 +7,8 @@ import pytest
 from drifting import DEPTH, FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES
 from ensembles import few
 from numpy.testing import assert_allclose, assert_array_equal
-from records import table
+from records import arrays_at, table
+from xarray.testing import assert_identical
 
 from seakeep import HankelDMDc
 from seakeep.baselines import Subspace
@@ -45,25 +46,23 @@ def unplaced(run):
     return run
 
 
-def reads_until(model, run):
+def reads_until(model):
     """Sample of the last wave that a forecast reads."""
-    start = round((START - float(run.time[0])) / model.dt)
-    return start + STEPS - 1 + model.lead_samples
+    return round(START / model.dt) + STEPS - 1 + model.lead_samples
 
 
 def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
-    end = reads_until(model, drift)
+    end = reads_until(model)
     last = end - 10
     short = up_to(drift, last)
     found = model.forecast(short, START, STEPS, ahead="predict")
-    assert found.sizes["time"] == STEPS
     # By hand: the probes continued, everything after the start but waves thrown away.
     long = up_to(drift, end).copy(deep=True)
     waves = foresee(
         table(short, INPUTS),
         10,
         dt=model.dt,
-        positions=[POSITIONS[name] for name in INPUTS],
+        positions=[*POSITIONS.values()],
         depth=DEPTH,
     )
     for name, values in zip(INPUTS, waves.expected.T, strict=True):
@@ -78,14 +77,12 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
         gone[name].values[last + 1 :] = np.nan
         gone[name].values[end + 1 :] = 1e9
     again = model.forecast(gone, START, STEPS, ahead="predict")
-    assert_array_equal(table(again, STATES), table(found, STATES))
-    assert again.attrs["status"] == found.attrs["status"]
+    assert_identical(again.assign_coords(time=found.time), found)
 
 
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     ensemble = few(n_members=3, lead=LEAD).fit(drifts, STATES, INPUTS)
-    last = reads_until(ensemble, drift) - 4
-    short = unplaced(up_to(drift, last))
+    short = unplaced(up_to(drift, reads_until(ensemble) - 4))
     members = ensemble.forecast(short, START, STEPS, ahead="predict")
     words, since = (members.attrs[key] for key in ("status", "input_predicted_from"))
     assert since == pytest.approx(float(members.time[STEPS - 4]))
@@ -103,9 +100,7 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
         assert set(windows["status"].values[1].ravel()) == {words}
     reduced = ensemble.summarize_windows(short, [10.0, START], STEPS, ahead="predict")
     assert_array_equal(reduced["input_predicted_from"], windows["input_predicted_from"])
-    at = round((START - float(drift.time[0])) / ensemble.dt)
-    x, u = table(short, STATES), table(short, INPUTS)
-    given = (x[: at + 1], u[: at + 1], u[at + 1 :], STEPS)
+    given = *arrays_at(ensemble, short, START), STEPS
     band = ensemble.hold().forecast_arrays(*given, ahead="predict")
     assert_allclose(band.mean, table(summary, STATES)[0], rtol=1e-9)
     one, every = ensemble.member(1).forecast_arrays(*given, ahead="predict"), table(members, STATES)
@@ -164,8 +159,7 @@ def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
     parts = np.full((3, 1, 1, 9, 1), -3.0)
     parts[lost, ..., -1, :] = np.nan
     weigh(parts, 9.0, 3)
-    expected = [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan]
-    assert_allclose(parts[0, 0, 0, :, 0], expected)
+    assert_allclose(parts[0, 0, 0, :, 0], [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan])
 
 
 def test_a_member_whose_departure_is_lost_counts_with_the_others():
@@ -186,10 +180,8 @@ def test_a_sea_that_departs_from_training_is_forecast_on():
 
 
 def test_errors_of_several_models_are_known_as_far_as_those_of_any():
-    parts = [
-        LeadErrors(n * np.eye(1), np.array(x)[:, None]) for n, x in ((1, [3.0]), (3, [1, 1, 4.0]))
-    ]
-    both = LeadErrors.together(parts)
+    given = (1, [[3.0]]), (3, [[1.0], [1.0], [4.0]])
+    both = LeadErrors.together([LeadErrors(n * np.eye(1), np.array(x)) for n, x in given])
     assert_allclose(both.residual, [[2.0]])
     assert_allclose(both.rms[:, 0] ** 2, [5.0, 5.0, 16.0])  # and never fall
 
@@ -198,27 +190,22 @@ def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
     scale = model.state_scale
     claimed = np.array([0.4, 0.6, 0.8, 0.7, 1.0])[:, None]  # squares over those of training
     errors, unknown = claimed * scale.spread**2, np.zeros(5, bool)
-    weight = weighed(np.zeros((1, 1, 5, 2)), errors, scale, unknown, np.zeros(2))[2]
-    assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
     # The mean errs more where measured states and the forecast lie far from it, not one alone.
-    for forecast, before, expected in ((3.0, 2.0, 4.0), (-2.0, 3.0, 4.0), (0.5, 3.0, 1.0)):
+    for forecast, before, expected in ((3, 2, 4), (-2, 3, 4), (0.5, 3, 1), (0, 0, 1)):
         runs = np.full((1, 1, 5, 2), scale.centre + forecast * scale.spread)
         weight = weighed(runs, expected * errors, scale, unknown, before * scale.spread)[2]
         assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
 
 
 def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):
-    model, at, steps = SPEC.fit(drifts, STATES, INPUTS), 400, 250
+    model, start, steps = SPEC.fit(drifts, STATES, INPUTS), 40.0, 250
     # Waves are known for longer than a forecast without them is trusted.
-    start, last = float(drift.time[at]), at + 100
-    short = unplaced(up_to(drift, last))
-    x, u = table(short, STATES), table(short, INPUTS)
-    found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
+    short = unplaced(up_to(drift, 500))
+    found = model.forecast_arrays(*arrays_at(model, short, start), steps, ahead="predict")
     known = table(model.forecast(drift, start, steps), STATES)
-    given = last - at + 1 - LEAD
+    given = 101 - LEAD
     assert_allclose(found[:given], known[:given], rtol=0, atol=1e-9)
     assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
     windows = model.forecast_windows(short, [10.0, start], steps, ahead="predict")
     whole = model.forecast(drift, 10.0, steps)  # all waves of that window were measured
-    both = np.stack([table(whole, STATES), found])
-    assert_allclose(table(windows, STATES), both, rtol=0, atol=1e-9)
+    assert_allclose(table(windows, STATES), [table(whole, STATES), found], rtol=0, atol=1e-9)

@@ -9,7 +9,6 @@ from said import data_error, request_error, warned
 
 from seakeep import HankelDMDc
 
-DT = 0.05
 fit = partial(HankelDMDc(3, 8, 1.0).fit, states=["heave", "pitch"], inputs=["eta_fwd", "eta_cog"])
 
 
@@ -18,19 +17,10 @@ def model(run):
     return fit(run)
 
 
-T = DT * np.arange(400)
-WRONG_TIMES = {
-    r"times of .* repeat: 2\.45 s stands at samples 49 and 50": np.r_[T[:50], T[49:-1]],
-    r"times of .* are not sorted: .* Sort the rows": np.r_[T[:50], T[59:49:-1], T[60:]],
-    r"1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s": np.r_[T[:50], T[50:] + 7 * DT],
-    r"are not uniform: steps run from 0\.05 to 0\.06 s": np.r_[T[:200], 1.2 * T[200:] - 2.0],
-    r"a value that is not finite at sample 50": np.where(T[50] == T, np.nan, T),
-}
-
-
-@pytest.mark.parametrize("message", WRONG_TIMES)
-def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, message):
-    bad = run.assign_coords(time=WRONG_TIMES[message])
+def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run):
+    """Which times are wrong: `tests/signals/test_time_axis.py`."""
+    bad = run.assign_coords(time=run.time + 0.35 * (run.time > 2.475))
+    message = r"1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s"
     with data_error(message):
         fit(bad)
     with data_error(message):
@@ -79,8 +69,6 @@ ARRAYS = {"x_history": (9, 2), "u_history": (9, 2), "u_future": (19, 2)}
         ("u_history", (2, 9), r"\(2, 9\); .* 9 rows \(z \+ 1\) and 2 col.* looks transposed"),
         ("u_future", (2, 19), r"\(2, 19\); .* 19 rows \(steps − 1\) .* looks transposed"),
         ("x_history", (3, 2), r"\(3, 2\); .*at least 4 rows"),
-        ("u_history", (8, 2), r"\(8, 2\); .*at least 9 rows"),
-        ("u_future", (18, 2), r"\(18, 2\); .*at least 19 rows"),
         ("u_history", (9, 3), r"\(9, 3\); .*and 2 columns"),
         ("x_history", (9,), r"\(9,\); expected \(time, channel\)"),
     ],
@@ -129,8 +117,7 @@ def test_runs_of_another_step_are_refused(model, run):
 @pytest.mark.parametrize("name", ["pitch", "eta_fwd"])
 def test_a_constant_channel_cannot_be_standardised(run, channels, name, value):
     run[name][:] = value
-    message = rf"channel '{name}' is constant \(.*\) over the training window"
-    with data_error(message):
+    with data_error(rf"channel '{name}' is constant \(.*\) over the training window"):
         fit(run)
     model = HankelDMDc(3, 8, 1.0, standardize=False).fit(run, **channels)
     assert np.all(np.isfinite(model.forecast(run, start=5.0, steps=20).heave))
@@ -148,8 +135,7 @@ def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(m
 def test_another_unit_than_trained_is_refused(model, run):
     degrees = run.copy()
     degrees["pitch"] = np.degrees(run.pitch).assign_attrs(units="deg")
-    message = r"channel 'pitch' of .* is in 'deg' and the model expects 'rad'\. Convert"
-    with data_error(message):
+    with data_error(r"channel 'pitch' of .* is in 'deg' and the model expects 'rad'\. Convert"):
         model.forecast(degrees, start=5.0, steps=5)
 
 
@@ -165,14 +151,12 @@ def test_another_unit_than_trained_is_refused(model, run):
         r"inputs must be a list .* received None\. .* takes inputs=\[\]": {"inputs": None},
         r"stop = 25 s is outside run, which runs from 0 to 19\.95 s": {"stop": 25.0},
         r"stop = nan s is outside run": {"stop": np.nan},
-        "stop must be an instant in seconds; received '5'": {"stop": "5"},
         "stop has 2 instants for 1 runs": {"stop": [5.0, 6.0]},
         "stop must be an instant in seconds; received True for run": {"stop": [True]},
         "stop must be an instant in seconds; received '5' for run": {"stop": {"run": "5"}},
         "stop names the run 'rum', which is not .*Did you mean 'run'": {"stop": {"rum": 5.0}},
         "no run was given": {"runs": []},
         r"is a ndarray; a run is an xarray\.Dataset": {"runs": np.zeros((3, 4))},
-        r"a is a NoneType; a run is an xarray\.Dataset": {"runs": {"a": None}},
         "has no coordinate 'time' .*sample": {"runs": xr.Dataset({"heave": ("sample", [0.0])})},
     }.items(),
 )

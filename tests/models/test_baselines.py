@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 from said import request_error
+from scipy import signal
 
 from seakeep import SlowSquares
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
@@ -24,16 +25,12 @@ SPECS = {
 
 
 def linear_run(seed, samples=600, noise=0.0):
-    """Two damped oscillators that two waves drive."""
-    rng = np.random.default_rng(seed)
-    u = rng.normal(size=(samples, 2))
-    a = np.array([[1.6, 0.1, -0.75, 0.0], [0.0, 1.4, 0.05, -0.6]])
-    b = np.array([[0.5, 0.1, 0.2, 0.0], [0.0, 0.3, 0.1, -0.2]])
-    x = np.zeros((samples, 2))
-    for j in range(2, samples - 1):
-        x[j + 1] = a @ np.r_[x[j], x[j - 1]] + b @ np.r_[u[j], u[j - 1]]
-    x += noise * rng.normal(size=x.shape)
-    channels = (np.c_[x, u] + [3.0, -1.0, 0.5, 0.0]).T
+    """Two damped oscillators that two waves drive; heave and pitch move in both."""
+    waves, rest = np.random.default_rng(seed).normal(size=(2, 2, samples))
+    laws = ([0.0, 0.5, 0.2], [1.0, -1.6, 0.75]), ([0.0, 0.3, -0.2], [1.0, -1.4, 0.6])
+    motions = [signal.lfilter(*law, wave) for law, wave in zip(laws, waves, strict=True)]
+    heave, pitch = [[1.0, 0.2], [0.1, 1.0]] @ np.stack(motions) + noise * rest
+    channels = 3.0 + heave, pitch - 1.0, 0.5 + waves[0], waves[1]
     return record(DT, {"run": f"run {seed}"}, **dict(zip(STATES + INPUTS, channels, strict=True)))
 
 
@@ -80,8 +77,7 @@ def test_fir_finds_a_known_impulse_response():
     heave, pitch = (np.r_[0.0, np.convolve(u, h)[:1999]] for h in response)
     run = record(DT, heave=heave, pitch=pitch, eta=u)
     model = FIR(input_delays=15, ridge=0.0, standardize=False).fit(run, STATES, ["eta"])
-    found = model.coefficients[:, 2:]
-    assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
+    assert_allclose(model.coefficients[:, 2:], np.c_[response, np.zeros((2, 4))], atol=1e-10)
     assert model.spectral_radius == 0.0
     with request_error(r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
@@ -130,5 +126,4 @@ def test_a_subspace_model_without_inputs_continues_the_states():
     swing = np.sin(2 * np.pi * np.arange(400) / 25)
     run = record(DT, {}, heave=swing)
     model = Subspace(6, 0, order=2, ridge=0.0).fit(run, ["heave"], [], stop=19.9)
-    forecast = model.forecast(run, start=25.0, steps=40)
-    assert_allclose(forecast["heave"], swing[251:291], atol=1e-4)
+    assert_allclose(model.forecast(run, start=25.0, steps=40)["heave"], swing[251:291], atol=1e-4)

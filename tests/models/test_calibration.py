@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from numpy.testing import assert_allclose, assert_array_equal
-from records import table
+from records import arrays_at, table
 from said import request_error
 
 import seakeep
@@ -33,7 +33,6 @@ def ensemble(run):
 
 
 SCALES = ["spread", "constant", "learnt"]
-of_each_scale = pytest.mark.parametrize("scale", SCALES)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def assert_kept(kept, ensemble, members):
     assert_array_equal(found, every[members])
 
 
-@of_each_scale
+@pytest.mark.parametrize("scale", SCALES)
 def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale):
     inside = {"members": [], "calibrated": []}
     for start in np.arange(112.0, 155.0, 4.0):
@@ -127,8 +126,7 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     learnt = bands["learnt"]
     one = wide_of(learnt, run)
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
-    x, u = table(run, STATES), table(run, INPUTS)
-    arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
+    arrays = learnt.hold().forecast_arrays(*arrays_at(learnt, run, 120.0), 30, band="calibrated")
     mean, _, _, upper = found = table(one, STATES)
     assert np.all(np.ptp(upper - mean, axis=0) > 0.01 * (upper - mean).mean(axis=0))  # no constant
     # Products of matrices of other sizes: other roundings.
@@ -139,8 +137,7 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
 
 
 def pooled(train_on, runs, window=None):
-    spec = few(window=window, n_members=6, train_on=train_on, **NOISY)
-    return spec.fit(runs, STATES, INPUTS)
+    return few(window=window, n_members=6, train_on=train_on, **NOISY).fit(runs, STATES, INPUTS)
 
 
 def assert_learnt(found, judged):

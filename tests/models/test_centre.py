@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
 from numpy.testing import assert_allclose
-from records import record, table
+from records import arrays_at, record, table
 from said import request_error
 
 from seakeep import BayesianHankelDMDc, HankelDMDc, Powers, SlowSquares, Uniform, load_model
@@ -23,8 +23,7 @@ SPEC = HankelDMDc(1, 0, 0.0, delay_rows="exact", centre="run")
 
 def vessel(seed, offset=0.0):
     """Two states in a steady answer to two inputs of period `PERIOD`, on zeros of their own."""
-    rng = np.random.default_rng(seed)
-    inputs = np.fft.rfft(rng.standard_normal((PERIOD, 2)), axis=0)
+    inputs = np.fft.rfft(np.random.default_rng(seed).standard_normal((PERIOD, 2)), axis=0)
     inputs[0] = inputs[40:] = 0.0
     z = np.exp(2j * np.pi * np.arange(len(inputs)) / PERIOD)[:, None, None]
     system = z * np.eye(2) - A[0] - A[1] / z
@@ -49,12 +48,10 @@ def test_the_system_is_recovered_from_runs_whose_zeros_differ():
     a = model.A[:2] * scale[:, None] / np.tile(scale, 2)
     # Exact data, through a Gram matrix.
     assert_allclose(a, np.hstack(A), rtol=0, atol=1e-6)
-    run = vessel(9, 50.0)
-    forecast = model.forecast(run, start=DT * (PERIOD + 20), steps=400)
-    (x, u), at = (table(run, names) for names in CHANNELS), PERIOD + 21
-    found = table(forecast, CHANNELS[0])
-    assert_allclose(found, x[at : at + 400], rtol=0, atol=1e-6)
-    values = model.forecast_arrays(x[:at], u[:at], u[at:], 400)
+    run, start = vessel(9, 50.0), DT * (PERIOD + 20)
+    found, at = table(model.forecast(run, start, 400), CHANNELS[0]), PERIOD + 21
+    assert_allclose(found, table(run, CHANNELS[0])[at : at + 400], rtol=0, atol=1e-6)
+    values = model.forecast_arrays(*arrays_at(model, run, start), 400)
     assert_allclose(values, found, rtol=0, atol=1e-9)
 
 

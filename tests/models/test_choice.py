@@ -88,7 +88,6 @@ def test_a_group_that_repeats_counts_once():
     [
         ([0.1, None, 0.2, None, 0.3], [1]),  # the best is the first
         ([0.3, None, 0.2, None, 0.1], [3]),  # and the last
-        ([0.2, None, 0.1, None, 0.2], [1, 3]),
         ([0.1, None, 0.102, None, 0.2], [1, 3]),  # 2 % worse counts as the best
         ([0.2, 0.1, 0.2, None, 0.3], []),
         ([None, None, 0.1, None, 0.2], [0, 1, 3]),
@@ -187,8 +186,7 @@ def test_regular_waves_are_held_out_by_period_and_others_are_said_to_be_extrapol
 def test_stated_squares_are_no_look_ahead_that_is_left_out():
     squares = SlowSquares("eta", orders=(0,), lags=(0, 1))
     spec = replace(SPEC, observables=(squares,))
-    chosen = spec.fit(runs(), STATES, INPUTS).settings.observables
-    assert set(chosen) <= {squares}
+    assert set(spec.fit(runs(), STATES, INPUTS).settings.observables) <= {squares}
 
 
 @pytest.mark.parametrize(("ahead", "alike"), [(0.5, True), (0.0, False)])

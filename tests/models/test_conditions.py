@@ -76,8 +76,7 @@ def test_another_unit_of_a_load_moves_its_mean_too():
 
 
 def test_of_two_runs_either_may_be_wrong():
-    runs = {"p1": vessel(1), "p2": vessel(4, offset=0.5)}
-    (each,) = disagreements(SPEC, runs, *CHANNELS)
+    (each,) = disagreements(SPEC, {"p1": vessel(1), "p2": vessel(4, offset=0.5)}, *CHANNELS)
     text = "p1 and p2 disagree; which one is wrong, these data do not say"
     assert sorted((each.run, each.rival)) == ["p1", "p2"]
     assert text in each.describe() or text.replace("p1 and p2", "p2 and p1") in each.describe()

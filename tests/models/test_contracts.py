@@ -33,8 +33,7 @@ def sea(seed=0):
 def test_each_probe_is_carried_once_per_run(drifts, drift):
     measured = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
     fitted = few(alignment=measured).fit(drifts, STATES, INPUTS)
-    carry = patch.object(alignment, "carry_by_dispersion", wraps=carry_by_dispersion)
-    with carry as carries:
+    with patch.object(alignment, "carry_by_dispersion", wraps=carry_by_dispersion) as carries:
         fitted.forecast_windows(drift, [20.0, 25.0, 30.0], steps=20)
     assert carries.call_count == len(INPUTS)
 

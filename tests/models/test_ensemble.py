@@ -7,7 +7,7 @@ import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from records import record, table
+from records import arrays_at, record, table
 from said import data_error, warned
 from scipy import stats
 
@@ -52,17 +52,15 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     wanted[[0, 2, 3]] += moved  # all but the standard deviation
     close = {"rtol": 0, "atol": 1e-12}  # rounding of the sums
     assert_allclose(table(centred.forecast_summary(unseen, 65.0, 120), STATES), wanted, **close)
-    x, u = table(unseen, STATES), table(unseen, INPUTS)
-    now = round(65.0 / DT) + 1
-    from_arrays = centred.hold().forecast_arrays(x[:now], u[:now], u[now:], 120)
-    assert_allclose(from_arrays[:4], wanted, **close)
+    x, u, ahead = arrays_at(centred, unseen, 65.0)
+    assert_allclose(centred.hold().forecast_arrays(x, u, ahead, 120)[:4], wanted, **close)
     live = centred.live()
-    for at in range(now):
-        live.step(u[at], x[at])
-    mean, std, *_ = table(live.forecast(120, u[now:]), STATES)
+    for sample in zip(u, x, strict=True):
+        live.step(*sample)
+    mean, std, *_ = table(live.forecast(120, ahead), STATES)
     assert_allclose(mean, expected, **close)
     one_step = table(single.forecast(unseen, 64.6, 1), STATES)[0]
-    assert_allclose(live.innovation, x[now - 4] - one_step, **close)  # three wait for waves ahead
+    assert_allclose(live.innovation, x[-4] - one_step, **close)  # three wait for waves ahead
     both = np.hypot(wanted[1], live.errors.at(np.arange(1, 121)))  # of members, and of any model
     assert_allclose(std, both, rtol=1e-9)
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
@@ -74,15 +72,13 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
 def test_draws_are_rounded_to_the_nearest_sample(run):
     draws = fitted(run).draws
     for name in ("window", "state_delays", "input_delays"):
-        expected = np.floor(draws[name] * PERIOD / DT + 0.5)
-        assert_array_equal(draws[f"{name}_samples"], expected)
+        assert_array_equal(draws[f"{name}_samples"], np.floor(draws[name] * PERIOD / DT + 0.5))
 
 
 @pytest.mark.parametrize("sampling", ["monte_carlo", "sobol"])
 def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
     six = fitted(run, sampling=sampling).draws
-    many = fitted(run, sampling=sampling, n_members=8).draws
-    kept = many.isel(member=slice(6))
+    kept = fitted(run, sampling=sampling, n_members=8).draws.isel(member=slice(6))
     xr.testing.assert_equal(six, kept)
     assert not np.allclose(six.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
 
@@ -144,8 +140,7 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     for window, start in enumerate(starts):
         single = ensemble.forecast(run, start=start, steps=60)
         # Two windows are one product: other roundings.
-        found = table(together, STATES)[window]
-        assert_allclose(found, table(single, STATES), atol=1e-10)
+        assert_allclose(table(together, STATES)[window], table(single, STATES), atol=1e-10)
     judged, _ = ensemble.judged_runs(run, "run", [650, 703], 60)
     assert_allclose(judged, table(together, STATES).mean(axis=1), atol=1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
@@ -185,8 +180,7 @@ def test_members_that_diverge_say_when():
     heave = growth + 1e-12 * rng.normal(size=300)
     pitch, eta = rng.normal(size=(2, 300))
     run = record(DT, heave=heave, pitch=pitch, eta=eta)
-    spec = small(window="10 T", ridge=1e-3, n_members=10)
-    ensemble = spec.fit(run, STATES, INPUTS, stop=20.0)
+    ensemble = small(window="10 T", ridge=1e-3, n_members=10).fit(run, STATES, INPUTS, stop=20.0)
     forecast = ensemble.forecast(run, start=20.0, steps=99)
     summary = ensemble.forecast_summary(run, start=20.0, steps=99)
     lost = np.isnan(forecast.heave).any("time").values

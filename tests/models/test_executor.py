@@ -182,8 +182,7 @@ def test_a_dask_cluster_gives_the_same_members_and_is_not_waited_for_once_lost(
                 assert set(threads) == {1}
             with pytest.raises(ValueError, match="item 0"):
                 list(in_order(side_work.refuse, None, range(3), executor))
-        expected = ensemble.forecast_summary(run, start=31.0, steps=30)
-        xr.testing.assert_identical(found, expected)
+        xr.testing.assert_identical(found, ensemble.forecast_summary(run, start=31.0, steps=30))
         monkeypatch.setattr(executors, "PATIENCE", 1.0)
         with client(2) as left:
             lose(workers, left.get_executor(pure=False))

@@ -53,11 +53,6 @@ def model(models):
     return models["plain"]
 
 
-@pytest.fixture(scope="module")
-def ensemble(drifts):
-    return few(lead=6).fit(drifts, STATES, INPUTS)
-
-
 def play(live, run, first, stop, lost=(), dead=()):
     """Step through samples; those that are `lost`, and `dead` channels, are not measured."""
     u, y = table(run, INPUTS), table(run, STATES)
@@ -71,6 +66,16 @@ def started(model, run, stop=START):
     live = model.live(like=run)
     play(live, run, 0, stop)
     return live
+
+
+@pytest.fixture
+def waves(drift):
+    return table(drift, INPUTS)
+
+
+@pytest.fixture
+def motions(drift):
+    return table(drift, STATES)
 
 
 @pytest.fixture
@@ -92,22 +97,23 @@ def std(forecast):
 
 
 @pytest.mark.parametrize("key", SETTINGS)
-def test_fed_with_everything_it_is_the_forecast(models, drift, key):
+def test_fed_with_everything_it_is_the_forecast(models, drift, key, motions):
     model = models[key]
     live = started(model, drift)
     found = driven(live, drift)
     expected = model.forecast(drift, start=float(drift.time[START - 1]), steps=STEPS)
     # The same numbers go through the same products; an instant differs by the rounding of its sum.
     assert_array_equal(mean(found), table(expected, STATES))
-    assert_array_equal(live.state, table(drift, STATES)[START - 1])
+    assert_array_equal(live.state, motions[START - 1])
     assert not live.covariance.any()
     play(live, drift, START, START + max(model.signature.lead_samples, 1))  # and then it is final
-    surprise = table(drift, STATES)[START] - table(expected, STATES)[0]
     # One-step predictions in physical units, and the forecast in deviations: rounding.
-    assert_allclose(live.innovation, surprise, rtol=0, atol=1e-9)
+    assert_allclose(live.innovation, motions[START] - table(expected, STATES)[0], rtol=0, atol=1e-9)
 
 
-def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(model, live, drift):
+def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(
+    model, live, drift, waves
+):
     lost = 120
     expected = table(model.forecast(drift, start=float(drift.time[START - 1]), steps=lost), STATES)
     for since in range(1, lost + 1):
@@ -115,11 +121,9 @@ def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(mo
         (estimate,) = play(live, drift, at, at + 1, lost=[at])
         # One-step predictions in physical units, and the forecast in deviations: rounding adds up.
         assert_allclose(estimate, expected[since - 1], rtol=0, atol=1e-9)
-        deviation = np.sqrt(np.diagonal(live.covariance))
-        assert_allclose(deviation, model.errors.at(since), rtol=1e-9)
-    found = live.forecast(10, table(drift, INPUTS)[START + lost :])
-    limit = model.errors.at(lost + np.arange(1, 11))
-    assert_allclose(std(found), limit, rtol=1e-9)
+        assert_allclose(np.sqrt(np.diagonal(live.covariance)), model.errors.at(since), rtol=1e-9)
+    found = live.forecast(10, waves[START + lost :])
+    assert_allclose(std(found), model.errors.at(lost + np.arange(1, 11)), rtol=1e-9)
 
 
 def test_errors_are_those_of_data_that_were_not_trained_on():
@@ -133,23 +137,23 @@ def test_errors_are_those_of_data_that_were_not_trained_on():
     assert np.mean(found) == pytest.approx(1.1, rel=0.05)
 
 
-def test_a_dead_sensor_is_followed_through_the_others(model, live, drift):
+def test_a_dead_sensor_is_followed_through_the_others(model, live, drift, waves, motions):
     steps = 200
     found = play(live, drift, START, START + steps, dead=["heave"])
-    truth = table(drift, STATES)[START : START + steps]
+    truth = motions[START : START + steps]
     assert_array_equal(found[:, 0], truth[:, 0])
     assert_array_equal(np.isnan(live.innovation), [False, True])
     deviation = np.sqrt(live.covariance[1, 1])
     assert 0 < deviation < 1.001 * model.errors.at(steps)[1]
     assert rms(found[:, 1] - truth[:, 1]) < 3 * deviation
-    forecast = live.forecast(STEPS, table(drift, INPUTS)[START + steps :])
+    forecast = live.forecast(STEPS, waves[START + steps :])
     own, bound = (model.errors.of_forecast(STEPS, since) for since in (0, steps))
     carried = np.minimum(own + live._filter.ahead(STEPS, live._raised), bound)
     assert_allclose(std(forecast) ** 2, carried, rtol=1e-9)
     assert np.any(carried > 1.1 * own)
     assert np.any(carried < 0.9 * bound)
     again = play(live, drift, START + steps, START + steps + 5)
-    assert_array_equal(again[-1], table(drift, STATES)[START + steps + 4])
+    assert_array_equal(again[-1], motions[START + steps + 4])
     assert not live.covariance.any()
 
 
@@ -177,8 +181,7 @@ def test_measurement_noise_makes_an_estimate_of_a_measured_state(model, drift):
     noise = {"heave": 0.05, "surge": 0.02}
     live = model.live(noise=noise)
     rough = drift.copy(deep=True)
-    rng = default_rng(1)
-    rough["heave"].values += noise["heave"] * rng.standard_normal(drift.sizes["time"])
+    rough["heave"].values += noise["heave"] * default_rng(1).standard_normal(drift.sizes["time"])
     found = play(live, rough, 0, START)[200:, 1]
     truth = drift["heave"].values[200:START]
     assert np.std(found - truth) < 0.9 * np.std(rough["heave"].values[200:START] - truth)
@@ -255,8 +258,7 @@ def test_outside_the_training_the_band_widens_and_says_why(model, drift, monkeyp
     # Without errors of late, the height alone.
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, len(STATES))))
     made = driven(live, higher)
-    expected = ratio * model.errors.at(np.arange(STEPS) + 1)
-    assert_allclose(std(made), expected, rtol=1e-12)
+    assert_allclose(std(made), ratio * model.errors.at(np.arange(STEPS) + 1), rtol=1e-12)
 
 
 @in_place_and_carried
@@ -282,28 +284,26 @@ def test_a_sample_that_jumps_is_lost_and_named(models, drift, tmp_path, key, nam
     assert spiked.validity == lost.validity == Validity(0)
 
 
-def test_a_load_may_jump_and_so_may_an_input_that_is_no_wave(model, drift):
+def test_a_load_may_jump_and_so_may_an_input_that_is_no_wave(model):
     units = [label.units for label in model.signature.state_labels]
-    live = model.live(roles={INPUTS[0]: "constant"})
-    least = live.equations["smoothest"]
+    least = model.live(roles={INPUTS[0]: "constant"}).equations["smoothest"]
     assert_array_equal(np.isinf(least), [True, False, *(each not in MOTIONS for each in units)])
     assert_allclose(4 * least[1], 0.01 * model.coverage.heights[1], rtol=1e-12)
 
 
-def test_filled_waves_drive_no_free_run(model, drift):
-    u, y = table(drift, INPUTS), table(drift, STATES)
+def test_filled_waves_drive_no_free_run(model, waves, motions):
     live, gaps = model.live(), model.live()
     for at in range(2 * START):
         is_lost = at >= START and at % live.model.history_samples == 0
-        live.step(None if is_lost else u[at], y[at])
-        gaps.step(None if at > 4 and at % live.model.history_samples == 0 else u[at], y[at])
+        live.step(None if is_lost else waves[at], motions[at])
+        hole = at > 4 and at % live.model.history_samples == 0
+        gaps.step(None if hole else waves[at], motions[at])
         if at == START:
             before = live.consistency_by_state[1]
     assert np.all(before != 1)
     assert np.isnan(gaps.consistency_by_state[1]).all()
     # What is not judged is forgotten.
-    after = live.consistency_by_state[1]
-    assert np.all(np.abs(after - 1) < 0.3 * np.abs(before - 1))
+    assert np.all(np.abs(live.consistency_by_state[1] - 1) < 0.3 * np.abs(before - 1))
 
 
 @pytest.mark.parametrize("value", [9.97e36, 1e200])
@@ -318,11 +318,10 @@ def test_a_spike_is_forgotten_by_the_consistency(model, drift, value, monkeypatc
     assert 0.5 < live.consistency < 1.5
 
 
-def test_waves_that_are_not_known_widen_the_band(models, drift):
-    model = models["lead"]
-    live = started(model, drift)
+def test_waves_that_are_not_known_widen_the_band(models, drift, waves):
+    live = started(models["lead"], drift)
     known, unknown = driven(live, drift), live.forecast(STEPS)
-    part = live.forecast(STEPS, table(drift, INPUTS)[START : START + 20])
+    part = live.forecast(STEPS, waves[START : START + 20])
     assert (known.attrs["known_input"], part.attrs["known_input"]) == (STEPS + 5, 20)
     assert unknown.attrs["known_input"] == 0
     least, more, most = map(std, (known, part, unknown))
@@ -345,15 +344,14 @@ def test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known(models, d
     assert np.all(widened.heave.sel(statistic="std") > calm.heave.sel(statistic="std"))
 
 
-def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, ensemble, drift):
+def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, drifts, drift):
     steps, cut = 150, drift.isel(time=slice(0, START))
-    for model in (models["lead"], ensemble):
+    for model in (models["lead"], few(lead=6).fit(drifts, STATES, INPUTS)):
         expected = model.forecast(cut, float(cut.time[-1]), steps, ahead="predict")
         if "member" in expected.dims:
             assert expected["heave"].std("member").values[-1] > 0  # a band stays
             expected = expected.mean("member")
-        live = started(model, cut)
-        found = live.forecast(steps)
+        found = started(model, cut).forecast(steps)
         assert_allclose(mean(found), table(expected, STATES), rtol=0, atol=1e-9)
         # By then all weight is on the mean of training, which errs by the SD there.
         scale = model.signature.state_scale
@@ -361,11 +359,13 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, ensemble,
         assert_allclose(std(found)[-20:, 1], scale.spread[1], rtol=1e-9)
 
 
-def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(model, models, drift):
+def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(
+    model, models, drift, waves
+):
     rough, rng = drift.copy(deep=True), default_rng(6)
     for name in INPUTS:
         rough[name].values += 5e-4 * rng.standard_normal(drift.sizes["time"])
-    apart, filled, known = [], [], table(drift, INPUTS)[START:]
+    apart, filled, known = [], [], waves[START:]
     # 3.67 m at the group speed of 0.38 Hz, below which a twentieth of the waves lies; of forty
     # frequencies, each holds as much as that.
     for like, expected in ((None, 0.0), (drift, 3.67 / group_speed(2 * np.pi * 0.384, 3.6))):
@@ -373,8 +373,7 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(model,
         play(live, rough, 0, START)
         error = mean(live.forecast(10)) - mean(live.forecast(10, known))
         apart.append(np.square(error[:, 1]).mean())  # heave: surge answers no wave
-        found = live.forecast(2).attrs["predictable"]
-        assert found == pytest.approx(expected, rel=0.15)
+        assert live.forecast(2).attrs["predictable"] == pytest.approx(expected, rel=0.15)
         live = model.live(like=like)
         play(live, rough, 0, START)
         for _ in range(10):
@@ -401,8 +400,7 @@ def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, tmp_pa
     assert found.attrs["known_input"] == 0
     for each in ("mean", "std"):
         # What is predicted from is the same, but for the oldest samples of a full record.
-        expected = mean(before, each)[count:]
-        assert_allclose(mean(found, each), expected, rtol=0, atol=2e-3)
+        assert_allclose(mean(found, each), mean(before, each)[count:], rtol=0, atol=2e-3)
     play(live, drift, START + count, START + count + 8)
     assert live.validity & Validity.LOST  # thirty samples are no gap that is closed
     play(live, drift, START + count + 8, START + count + models[key].history_samples)
@@ -424,12 +422,14 @@ def test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead(model, dr
     assert std(live.forecast(5))[0, 1] ** 2 > 1.05 * variance[1]
 
 
-def test_forecasts_read_waves_whose_short_gaps_are_closed(models, drift, monkeypatch):
-    live, waves, seen = models["aligned"].live(like=drift), table(drift, INPUTS)[:START], []
+def test_forecasts_read_waves_whose_short_gaps_are_closed(
+    models, drift, monkeypatch, waves, motions
+):
+    live, waves, seen = models["aligned"].live(like=drift), waves[:START], []
     lost = default_rng(8).uniform(size=START) < 0.1
     lost[:4], lost[-2:] = False, [True, False]  # the newest gap has one sample behind it
     for at in range(START):
-        live.step(None if lost[at] else waves[at], table(drift, STATES)[at])
+        live.step(None if lost[at] else waves[at], motions[at])
     filled = np.square(live._known_inputs() - waves)[lost].mean()
     monkeypatch.setattr(live, "_foreseen", lambda of, count: seen.append(of) or foresee(of, count))
     live.forecast(5)
@@ -437,22 +437,20 @@ def test_forecasts_read_waves_whose_short_gaps_are_closed(models, drift, monkeyp
     assert_array_equal(seen[0][~lost], waves[~lost])
 
 
-def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift):
+def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift, waves, motions):
     """Also the one up-wave, for which what it was filled by is read again and again."""
-    waves = table(drift, INPUTS)
     for dead in range(2):
         live = started(models["aligned"], drift)
         lost = waves.copy()
         lost[:, dead] = np.nan
-        for sample, states in zip(lost[START:], table(drift, STATES)[START:], strict=True):
+        for sample, states in zip(lost[START:], motions[START:], strict=True):
             live.step(sample, states)
-        filled = live._known_inputs()[-200:, dead]
-        assert np.abs(filled).max() < np.abs(waves[:, dead]).max()
+        assert np.abs(live._known_inputs()[-200:, dead]).max() < np.abs(waves[:, dead]).max()
 
 
-def test_skill_against_lead_time_is_that_of_forecasts_by_hand(model, live, drift):
+def test_skill_against_lead_time_is_that_of_forecasts_by_hand(model, live, drift, motions):
     steps = 10
-    spread, truth = model.state_scale.spread, table(drift, STATES)
+    spread, truth = model.state_scale.spread, motions
     truth[START + 5, 1] = np.nan  # not measured, and not judged
     span = tuple(float(drift.time[at]) for at in (START, START + 1 + steps))
     known = drift.assign({n: ("time", truth[:, k], drift[n].attrs) for k, n in enumerate(STATES)})
@@ -470,15 +468,17 @@ def test_skill_against_lead_time_is_that_of_forecasts_by_hand(model, live, drift
     assert_array_equal(found.coverage, inside)
 
 
-def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(model, drift):
-    measured, live = table(drift, INPUTS), model.live()
+def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(
+    model, drift, waves, motions
+):
+    live = model.live()
     play(live, drift, 0, START)
-    live.step({INPUTS[0]: measured[START, 0]}, table(drift, STATES)[START])
-    expected = [measured[START, 0], predict_waves(measured[:START], 1)[0, 1]]
+    live.step({INPUTS[0]: waves[START, 0]}, motions[START])
+    expected = [waves[START, 0], predict_waves(waves[:START], 1)[0, 1]]
     assert_array_equal(live._known_inputs()[-1], expected)
 
 
-def test_a_step_and_a_forecast_run_on_one_thread(live, drift):
+def test_a_step_and_a_forecast_run_on_one_thread(live, waves):
     seen = []
 
     def seen_by(values):
@@ -492,7 +492,7 @@ def test_a_step_and_a_forecast_run_on_one_thread(live, drift):
 
     class Rows:
         def __array__(self, dtype=None, copy=None):
-            return seen_by(table(drift, INPUTS)[START : START + 5])
+            return seen_by(waves[START : START + 5])
 
     with threadpool_limits(2, user_api="blas"):
         live.step(Sample())
@@ -551,10 +551,10 @@ BAD = {
 
 
 @pytest.mark.parametrize("message", BAD)
-def test_a_bad_sample_leaves_the_state_as_it_was(model, drift, message):
+def test_a_bad_sample_leaves_the_state_as_it_was(model, drift, message, waves, motions):
     assert np.isnan(model.live().state).all()
     live, untouched = started(model, drift, 100), started(model, drift, 100)
-    good = {"u": table(drift, INPUTS)[100], "y": table(drift, STATES)[100]}
+    good = {"u": waves[100], "y": motions[100]}
     with request_error(message):
         live.step(**good | BAD[message])
     for each in (live, untouched):
@@ -611,18 +611,17 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     assert given.attrs["known_input"] == 39
 
 
-def test_the_jacobian_is_the_derivative_of_a_forecast(models, drift):
+def test_the_jacobian_is_the_derivative_of_a_forecast(models, waves, motions):
     """Of a model with squares and a place: along its rows, what a forecast changes by."""
     model, rng = models["aligned"], default_rng(0)
     count = model.history_samples
-    x = table(drift, STATES)[300 - model.signature.state_samples : 300]
-    u = table(drift, INPUTS)[300 - count : 300 + model.lead_samples]
+    x = motions[300 - model.signature.state_samples : 300]
+    u = waves[300 - count : 300 + model.lead_samples]
     change = [1e-4 * rng.standard_normal(each.shape) for each in (x, u)]
 
     def after(side):
         rows = u + side * change[1]
         return model.forecast_arrays(x + side * change[0], rows[:count], rows[count:], 1)[0]
 
-    derivatives = model.jacobian(x, u)
-    along = sum(np.tensordot(d, c, 2) for d, c in zip(derivatives, change, strict=True))
+    along = sum(np.tensordot(d, c, 2) for d, c in zip(model.jacobian(x, u), change, strict=True))
     assert_allclose(along, 0.5 * (after(1) - after(-1)), rtol=1e-4, atol=1e-9)

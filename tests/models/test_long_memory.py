@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from records import record
+from oscillators import arx_run
 from said import request_error
-from scipy import signal
 
 from seakeep import HankelDMDc, Select, tune
 
-DT = 0.1
 WEIGHTS = np.array([0.9, -0.5, 0.0, 0.0, 0.0, *[0.3 / 4] * 4, *[-0.4 / 8] * 8])
 """Of x(k) … x(k − 16): two delays, and the means of delays 5 to 8 and 9 to 16."""
 SPEC = HankelDMDc(4, 0, 0.0, standardize=False, delay_rows="exact", memory=16)
@@ -19,10 +17,7 @@ SPEC = HankelDMDc(4, 0, 0.0, standardize=False, delay_rows="exact", memory=16)
 
 def remembering(seed, samples=300):
     """A heave that remembers means of its past, driven by the wave of the instant."""
-    rng = np.random.default_rng(seed)
-    eta = rng.standard_normal(samples)
-    heave = signal.lfilter([0.0, 0.7], [1.0, *-WEIGHTS], eta)
-    return record(DT, {"encounter_period": 0.4}, heave=heave, eta=eta)
+    return arx_run(seed, WEIGHTS, [0.7], samples, 0.4)
 
 
 def test_a_sparse_memory_is_recovered():

@@ -66,8 +66,7 @@ def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():
 
 
 def test_slow_squares_are_the_sums_that_they_stand_for():
-    rng = np.random.default_rng(1)
-    series, kernel = rng.normal(size=80), slow_kernel(0.05, 6)
+    series, kernel = np.random.default_rng(1).normal(size=80), slow_kernel(0.05, 6)
     found = [slow_squares(series, order, kernel, (3, -2), DT) for order in (0, 1, 2)]
     derivatives = [
         lambda j: series[j],

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
-from records import record, rms, table
+from oscillators import arx_run
+from records import arrays_at, rms
 from said import data_error, request_error, warned
-from scipy import signal
 
 from seakeep import HankelDMDc, check, load_model, tune
 from seakeep.hosts.program import exportable
 from seakeep.models import specs
 from seakeep.models.engine import read_groups
 
-DT = 0.1
 ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
 """Of x(k) and x(k − 1): at a draught of zero, and their change per unit."""
 ON_WAVE = 0.5, 0.4
@@ -28,12 +27,8 @@ CHOSEN = HankelDMDc(
 
 def vessel(draught, seed, samples=400, noise=0.0):
     """A heave of second order whose coefficients are linear in the draught."""
-    rng = np.random.default_rng(seed)
-    eta, rest = rng.standard_normal((2, samples))
     a, b = (fixed + draught * slope for fixed, slope in (ON_STATE, ON_WAVE))
-    heave = signal.lfilter([0.0, b], [1.0, *-a], eta) + noise * rest
-    attrs = {"encounter_period": 0.4, "rig": {"draught": draught}}
-    return record(DT, attrs, heave=heave, eta=eta)
+    return arx_run(seed, a, [b], samples, 0.4, noise).assign_attrs(rig={"draught": draught})
 
 
 def vessels(draughts, seed, *more):
@@ -72,16 +67,14 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
     served = [each.at(parameter=0.7).live(like=run).errors for each in (model, again)]
     assert_array_equal(served[0].rms, served[1].rms)
-    x, u = table(run, ["heave"]), table(run, ["eta"])
-    arrays = at.forecast_arrays(x[:51], u[:51], u[51:251], 200)
+    arrays = at.forecast_arrays(*arrays_at(at, run, 5.0), 200)
     assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):
     runs = {"shallow": vessel(0.2, 5), "deep": vessel(0.9, 6)}
     places = [("deep", 5.0), ("shallow", 6.0), ("deep", 7.0)]
-    windows = read_groups(model.signature, runs, [(places, 50)])
-    together = model.free_runs(windows)[0][0]
+    together = model.free_runs(read_groups(model.signature, runs, [(places, 50)]))[0][0]
     for (name, start), values in zip(places, together, strict=True):
         alone = model.forecast(runs[name], start, 50)
         # Windows side by side are summed in another order.

@@ -20,7 +20,7 @@ from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
 STATES = [*MOTIONS, "mooring_bow"]
-START, STEPS, PERIOD = 60.0, 300, 1.5
+START, STEPS = 60.0, 300
 SPEC = HankelDMDc(
     10, 40, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", alignment=FOLLOWED, lead=12
 )
@@ -56,19 +56,16 @@ def error(model, run):
 
 def test_the_line_and_its_load_are_recovered_to_the_noise(chosen, drift):
     (line,) = chosen.signature.readouts
-    spacing = chosen.signature.input_map.follows.place.spacing
-    assert abs(line.load.place - LINE) <= spacing / 2
+    assert abs(line.load.place - LINE) <= chosen.signature.input_map.follows.place.spacing / 2
     # Of measured motions: what is left is noise, and what the carriers err.
     windows = chosen.read_windows(drift, [START], STEPS)
     measured = table(drift, STATES)[601 : 601 + STEPS]
     found = line.read(measured, windows.waves[0, :, 0])
-    left = rms(found - measured[:, 2])
-    assert LOAD_NOISE * 0.9 < left < LOAD_NOISE * 1.5
+    assert LOAD_NOISE * 0.9 < rms(found - measured[:, 2]) < LOAD_NOISE * 1.5
 
 
 def test_the_wave_at_the_line_is_that_of_the_tank(chosen, drift):
-    windows = chosen.read_windows(drift, [START], STEPS)
-    wave, rate = windows.waves[0, :, 0].T
+    wave, rate = chosen.read_windows(drift, [START], STEPS).waves[0, :, 0].T
     # From the definition of the load, where its line is wet.
     motions = 30.0 - 2.0 * drift["surge"].values + 5.0 * drift["heave"].values
     wet = (drift["mooring_bow"].values - motions)[601 : 601 + STEPS] / 200.0
@@ -133,8 +130,7 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
     assert f"mooring_stern: none, floor {stern.floor:.4g} N" in model.summary()
     assert_array_equal(load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor))
     assert_identical(load["mooring_bow"], linear["mooring_bow"])
-    taut = moored(spec, slack=False)
-    assert not any(each.acts for each in taut.signature.readouts)
+    assert not any(each.acts for each in moored(spec, slack=False).signature.readouts)
     ensemble = moored(few(readouts="auto"))
     monkeypatch.setattr(ensembles, "weigh_members", lambda _, parts, *__: parts[0].fill(-9.0))
     found = ensemble.forecast(high[{"time": slice(0, 300)}], 20.0, 400, ahead="predict")
@@ -155,10 +151,8 @@ def test_no_linear_system_stands_for_it(tmp_path):
 
 
 def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs):
-    one = bow("auto").fit(runs["run1"], STATES, INPUTS)
-    assert kinds(one) == ["wave"]
-    short = runs["run1"].isel(time=slice(0, 300))
-    model = bow("auto").fit(short, STATES, INPUTS)
+    assert kinds(bow("auto").fit(runs["run1"], STATES, INPUTS)) == ["wave"]
+    model = bow("auto").fit(runs["run1"].isel(time=slice(0, 300)), STATES, INPUTS)
     assert kinds(model) == ["none"]
     assert "(not judged: no waves are carried, or" in model.summary()
 

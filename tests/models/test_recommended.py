@@ -32,8 +32,7 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what():
         assert f"observables {names}, lead" in line
         assert ("(chosen)" in line) == (names == ", ".join(kinds))
     # The settings that were chosen give the same model again.
-    same = settings.fit(runs(), STATES, INPUTS)
-    assert_array_equal(same.coefficients, model.coefficients)
+    assert_array_equal(settings.fit(runs(), STATES, INPUTS).coefficients, model.coefficients)
     assert model.history_samples <= SPEC.needs(DT).history + 1
     assert model.lead_samples <= SPEC.needs(DT).lead
 
@@ -68,8 +67,7 @@ def test_members_learn_from_windows_of_long_runs_and_else_from_all_of_them():
     assert len({(draw.run, draw.last, draw.settings.window) for draw in taught.members}) == 12
     regular = {**long, "c": long["c"].assign_attrs(waves="regular")}
     short = {**long, "c": sea(2, samples=round(110 * PERIOD))}
-    alone = {"a": long["a"]}
-    for given in (regular, short, alone):
+    for given in (regular, short, {"a": long["a"]}):
         ensemble = spec.fit(given, STATES, INPUTS)
         assert ensemble.origin["train_on"] == "all"
         assert {(draw.run, draw.settings.window) for draw in ensemble.members} == {(None, None)}

@@ -49,5 +49,4 @@ def test_few_periods_warn_and_enough_do_not(seed):
 
 
 def test_waves_alone_and_a_drift_that_does_not_govern_are_left_alone():
-    runs = {"a": run_of(1, 210, slow=0.1)}
-    assert slow_motions(runs, ["surge", "heave"], 33.0, PERIOD) == []
+    assert slow_motions({"a": run_of(1, 210, slow=0.1)}, ["surge", "heave"], 33.0, PERIOD) == []

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from drifting import DT, FOLLOWED, INPUTS, drifting_run
 from numpy.testing import assert_allclose
-from records import table
+from records import arrays_at, table
 from said import data_error
 from xarray.testing import assert_identical
 
@@ -44,8 +44,7 @@ VARIANTS = {
 
 
 def settings(key):
-    shared = {"delay_rows": "exact", "ridge_scale": "per_snapshot", "window": 900}
-    return shared | VARIANTS[key]
+    return {"delay_rows": "exact", "ridge_scale": "per_snapshot", "window": 900} | VARIANTS[key]
 
 
 @pytest.fixture(scope="module")
@@ -89,16 +88,15 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     several = model.forecast_windows(run, [START * DT, 50.0], STEPS)
     assert_allclose(table(several, STATES)[0], table(expected, STATES), **close)
     carried = reads_surge(model)
-    x, u = table(run, STATES), table(model.aligned_inputs(run) if carried else run, INPUTS)
     if carried:  # as a whole record, and not up to the end of the forecast
-        close["atol"] = 1e-6
-    arrays = model.forecast_arrays(x[: START + 1], u[: START + 1], u[START + 1 :], STEPS)
-    assert_allclose(arrays, table(expected, STATES), **close)
+        run, close["atol"] = run.assign(model.aligned_inputs(run)), 1e-6
+    x, u, ahead = arrays_at(model, run, START * DT)
+    assert_allclose(model.forecast_arrays(x, u, ahead, STEPS), table(expected, STATES), **close)
     if not carried:
         live = model.live(like=run)
-        for at in range(START + 1):
-            live.step(u[at], x[at])
-        served = live.forecast(STEPS, u[START + 1 :]).isel(statistic=0)
+        for sample in zip(u, x, strict=True):
+            live.step(*sample)
+        served = live.forecast(STEPS, ahead).isel(statistic=0)
         assert_allclose(table(served, STATES), table(expected, STATES), **close)
 
 
@@ -126,8 +124,7 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
         if model.signature.input_map.follows is None and not spec.observables:
             # Places and observables are learnt once for all members.
             assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
-    again = load_model(ensemble.save(tmp_path / "e.nc"))
-    for same in (again, ensemble.hold()):
+    for same in (load_model(ensemble.save(tmp_path / "e.nc")), ensemble.hold()):
         assert_identical(forecast_of(same, run), found)
 
 
