@@ -25,6 +25,7 @@ from seakeep.study.judge import (
     difference_table,
     joined,
     median_of,
+    side_by_side,
     trend_table,
 )
 from seakeep.study.plan import make_plan, random_stream
@@ -44,6 +45,12 @@ def found(tmp_path_factory):
     true = xr.Dataset({"heave": ("time", heave)}, {"time": finer})
     true.to_netcdf(folder / "truth" / "unseen.nc", engine="h5netcdf")
     return run_study(read_study(folder / "study.toml"), folder / "out")
+
+
+def test_a_training_set_that_judges_no_window_stands_beside_those_that_do():
+    judged = xr.Dataset({"mean": (("window", "time"), np.ones((1, 3)))}, {"window": [0]})
+    found = side_by_side([[judged, judged, xr.Dataset()]], {"model": ["a"], "training": [*"xyz"]})
+    assert_array_equal(found["mean"].isnull().sum(("model", "window", "time")), [0, 0, 3])
 
 
 @pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")

@@ -143,7 +143,7 @@ def side_by_side(
 ) -> xr.Dataset:
     """Datasets over two new dimensions, first that of the rows."""
     out = xr.combine_nested(
-        grid, list(names), join="outer", combine_attrs="override", fill_value=fill
+        grid, list(names), coords="minimal", join="outer", combine_attrs="override", fill_value=fill
     ).assign_coords(names)
     return out.transpose(*names, ...)
 
