@@ -230,7 +230,7 @@ def gather(
         needed = min(place.first, place.first_column - settings.state_reach)
         labelled.check_finite(here[needed - begin :], states, run, name, needed)
         needed = min(place.first, place.first_column - settings.input_delays)
-        span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
+        span = Span(begin, place.last, place.last + 1 - input_map.around.ahead)
         regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
         instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *regressors), shifted, instants))
@@ -262,7 +262,7 @@ def _place(
     reach = settings.reach(input_map)
     place = training_window(last, settings.window, settings.state_reach, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
-    final = last - input_map.after
+    final = last - input_map.around.after
     shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
     return place, shifted, slice(begin, final + 1)
 
@@ -364,7 +364,7 @@ class TrainingArrays:
             time = np.asarray(run["time"].values, dtype=float)
             end = time.size
             x = labelled.sound_matrix(run, states, name, slice(first, None))
-            span = Span(first, end - 1, max(end - input_map.lead_samples, first))
+            span = Span(first, end - 1, max(end - input_map.around.ahead, first))
             u, v = run_regressors(input_map, run, states, inputs, name, span)
             for values in (x, u, v):
                 values.flags.writeable = False
@@ -416,7 +416,8 @@ def run_regressors(
     span = span._replace(first=span.first + missing)
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
-    first = read.first if needed is None or not input_map.is_identity else needed
+    as_is = input_map.alignment is None and input_map.observed is None and not input_map.lead
+    first = needed if as_is and needed is not None else read.first
     labelled.check_finite(values[first : read.stop], inputs, run, name, first)
     surge = None
     if (follows := input_map.follows) is not None:
