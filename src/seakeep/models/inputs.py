@@ -97,13 +97,12 @@ class InputMap:
         return self.alignment is not None and self.alignment.settings.surge == "measured"
 
     @property
-    def stretch(self) -> tuple[FloatArray, FloatArray] | None:
-        """Factors of the standard deviations that the columns are divided by; None for ones.
+    def stretch(self) -> tuple[FloatArray, FloatArray]:
+        """Factors of what columns are divided by, where the surge is followed.
 
         λ of a model that follows its own surge is small, and weighs more on powers.
         """
-        if self.follows is None:
-            return None
+        assert self.follows is not None
         inputs = np.ones(len(self.follows.alignment.inputs))
         delayed, direct = self.columns.stretch
         return np.append(inputs, delayed), np.append(direct, 1.0)
