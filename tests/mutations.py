@@ -306,7 +306,7 @@ CHANGES = {
     "models/draws.py": [
         ("int(generator.integers(needed - 1, samples[run]))", "int(generator.integers(needed, samples[run]))", "models/test_ensemble.py::test_the_frequentist_ensemble_differs_in_its_windows_alone"),
         ("key = (*seed.spawn_key, member)", "key = (*seed.spawn_key, 0)", "models/test_ensemble.py::test_infeasible_draws_are_drawn_again_and_counted"),
-        ("least = reach + 2 + input_map.after", "least = reach + 2", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
+        ("least = reach + 2 + input_map.around.after", "least = reach + 2", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
         ("max(settings.window, least) if", "settings.window + reach if", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
         ("points[number])", "points[0])", "models/test_ensemble.py::test_sobol_points_fill_the_prior_evenly"),
     ],
@@ -457,7 +457,7 @@ CHANGES = {
     ],
     "models/training.py": [
         ("/ (pooled.shape[1] - 1))", "/ pooled.shape[1])", "models/test_training_window.py::test_moments_are_those_of_the_windows_pooled_with_ddof_one"),
-        ("final = last - input_map.after", "final = last", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
+        ("final = last - input_map.around.after", "final = last", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
         ("last -= last > 0 and time[last] > float(at) + 1e-3 * step", "pass", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
         ("means[0][input_map.follows.column] = means[2][-1] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
     ],

@@ -161,7 +161,8 @@ def test_a_history_inside_the_window_is_not_counted_twice():
         for history in ("inside", "before")
     }
     plain, longer = (
-        SimpleNamespace(history=lambda z, most=most: most, after=0) for most in (12, 60)
+        SimpleNamespace(history=lambda z, most=most: most, around=InputMap().around)
+        for most in (12, 60)
     )
     assert [draws[key].needed(plain) for key in draws] == [50, 62]
     assert draws["inside"].needed(longer) == 62  # a pair after the longest history

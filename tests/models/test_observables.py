@@ -91,7 +91,7 @@ def test_columns_are_named_with_units_and_stand_in_two_groups(drift):
     assert len(direct) == 18
     assert direct[6].units == "(m/s)^2"
     # The squares look two periods ahead, which is more than the lead of the waves.
-    assert chain.lead_samples == 2 * PERIOD
+    assert chain.around.ahead == 2 * PERIOD
     # Five periods of lags and twice the filter's half width less the look-ahead.
     assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (22 + 1) - 2 * PERIOD
 

@@ -71,7 +71,7 @@ class Draw:
         """Samples of a run that the window, its history and its look-ahead take."""
         settings = self.settings
         reach = settings.reach(input_map)
-        least = reach + 2 + input_map.after
+        least = reach + 2 + input_map.around.after
         if settings.window is None:
             return least
         inside = settings.history == "inside"

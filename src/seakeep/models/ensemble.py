@@ -139,7 +139,7 @@ class HankelEnsemble(Model):
         """Whether the mean of the members is the forecast of a single model of all runs."""
         return self.centre is not None
 
-    @property
+    @cached_property
     def _taught(self) -> tuple[Draw, ...]:
         """The members, and what they are centred on."""
         return self.members if self.centre is None else (*self.members, self.centre)

@@ -79,12 +79,12 @@ class Model:
     @property
     def states(self) -> list[str]:
         """Names of the states, in the order of the model."""
-        return self.signature.states
+        return list(self.signature.states)
 
     @property
     def inputs(self) -> list[str]:
         """Names of the measured inputs, in the order of the model."""
-        return self.signature.inputs
+        return list(self.signature.inputs)
 
     @property
     def regressors(self) -> list[str]:

@@ -35,6 +35,18 @@ class Regressors(NamedTuple):
     direct: FloatArray
 
 
+class Around(NamedTuple):
+    """Samples of input that rows read about the instant from which a step starts.
+
+    Before it those with delays, and those without; after both, and after the instant forecast.
+    """
+
+    back: int
+    before: int
+    ahead: int
+    after: int
+
+
 @dataclass(frozen=True, eq=False)
 class InputMap:
     """How measured inputs become regressors, as fitted.
@@ -62,36 +74,22 @@ class InputMap:
     follows: Following | None = None
     reference: int = 0
 
-    @property
+    @cached_property
     def columns(self) -> Observed:
         """The observables, which may be none."""
         return self.observed or NOTHING
 
     @cached_property
-    def _around(self) -> tuple[int, int, int]:
-        """Samples that rows read: before those with delays, before those without, after both."""
+    def around(self) -> Around:
+        """Samples that rows read."""
         back, ahead = self.columns.reach(delayed=True)
         before, later = self.columns.reach(delayed=False)
         ahead += self.lead
         if self.follows is not None:
             back = max(self.follows.back, self.follows.place.taps.size - 1)
             ahead = self.follows.ahead
-        return back, before, max(ahead, later)
-
-    @cached_property
-    def lead_samples(self) -> int:
-        """Samples of input after the one a step starts from that drive the step."""
-        return self._around[2]
-
-    @property
-    def after(self) -> int:
-        """Samples of input that a step reads after the instant that it forecasts."""
-        return max(self.lead_samples - 1, 0)
-
-    @property
-    def is_identity(self) -> bool:
-        """Whether inputs drive the model as they are."""
-        return self.alignment is None and self.observed is None and not self.lead
+        ahead = max(ahead, later)
+        return Around(back, before, ahead, max(ahead - 1, 0))
 
     @property
     def reads_surge(self) -> bool:
@@ -99,13 +97,12 @@ class InputMap:
         return self.alignment is not None and self.alignment.settings.surge == "measured"
 
     @property
-    def stretch(self) -> tuple[FloatArray, FloatArray] | None:
-        """Factors of the standard deviations that the columns are divided by; None for ones.
+    def stretch(self) -> tuple[FloatArray, FloatArray]:
+        """Factors of what columns are divided by, where the surge is followed.
 
         λ of a model that follows its own surge is small, and weighs more on powers.
         """
-        if self.follows is None:
-            return None
+        assert self.follows is not None
         inputs = np.ones(len(self.follows.alignment.inputs))
         delayed, direct = self.columns.stretch
         return np.append(inputs, delayed), np.append(direct, 1.0)
@@ -119,7 +116,7 @@ class InputMap:
 
     def reads(self, span: Span) -> Span:
         """Samples of the measured inputs that rows read; direct ones count from the start on."""
-        back, before, ahead = self._around
+        back, before, ahead, _ = self.around
         first = min(span.first - back, span.known - before)
         if self.observed is None and self.follows is None:
             first = span.first + self.lead
@@ -166,7 +163,7 @@ class InputMap:
 
     def look_ahead(self, run: xr.Dataset, dt: float) -> float:
         """Seconds of input after the one a step starts from that drive the step, in this run."""
-        ahead = self.lead_samples * dt
+        ahead = self.around.ahead * dt
         if self.alignment is not None and self.follows is None:
             ahead += self.alignment.look_ahead(run)
         return ahead
@@ -228,7 +225,7 @@ class Drive:
         input_map, direct = self.input_map, self.direct(first, stop)
         if input_map.follows is None:
             begin, end = (each + input_map.lead - self.first for each in (first, stop))
-            back, _, ahead = input_map._around
+            back, _, ahead, _ = input_map.around
             low = max(begin - back, 0)
             values = input_map.columns.with_delayed(self.values[low : end + ahead - input_map.lead])
             return Regressors(values[begin - low : end - low], direct)
@@ -243,9 +240,9 @@ class Drive:
         """Columns without delays that no state drives."""
         if self.input_map.observed is None:
             return np.empty((stop - first, 0))
-        _, before, after = self.input_map._around
+        _, before, ahead, _ = self.input_map.around
         begin = max(first - before, self.first)
-        values = self.values[begin - self.first : stop + after - self.first]
+        values = self.values[begin - self.first : stop + ahead - self.first]
         return self.input_map.columns.direct(values)[first - begin : stop - begin]
 
     @cached_property
@@ -312,7 +309,7 @@ class Scale:
         for each in fields(self):
             getattr(self, each.name).flags.writeable = False
 
-    @property
+    @cached_property
     def bound(self) -> FloatArray:
         """Largest deviation in training, infinite for a channel that was constant there."""
         return np.where(self.reach > 0, self.reach, np.inf)
@@ -367,12 +364,12 @@ class Signature:
     readouts: tuple[FittedReadOut, ...] = field(default=(), repr=False)
     parameter: str = ""
 
-    @property
+    @cached_property
     def states(self) -> list[str]:
         """Names of the states, in the order of the model."""
         return [label.name for label in self.state_labels]
 
-    @property
+    @cached_property
     def inputs(self) -> list[str]:
         """Names of the measured inputs, in the order of the model."""
         return [label.name for label in self.input_labels]
@@ -393,7 +390,7 @@ class Signature:
         """The same with other moments."""
         return replace(self, state_scale=states, input_scale=inputs, direct_scale=direct)
 
-    @property
+    @cached_property
     def input_history(self) -> int:
         """Samples of input before the start that a forecast reads."""
         return self.input_map.history(self.input_delays)
@@ -401,14 +398,14 @@ class Signature:
     @property
     def input_after(self) -> int:
         """Samples of input after its last instant that a forecast reads."""
-        return self.input_map.after
+        return self.input_map.around.after
 
-    @property
+    @cached_property
     def history_samples(self) -> int:
         """Samples a forecast needs up to its start, that one included."""
         return max(self.state_delays, self.input_history) + 1
 
-    @property
+    @cached_property
     def state_samples(self) -> int:
         """Samples of the states among these: where the vessel was counts for delayed waves too."""
         follows, reference = self.input_map.follows, self.input_map.reference
@@ -417,10 +414,10 @@ class Signature:
             where = max(self.input_delays, reference) + follows.place.taps.size
         return max(self.state_delays + 1, reference, where)
 
-    @property
+    @cached_property
     def lead_samples(self) -> int:
         """Samples of input after the one a step starts from that drive the step."""
-        return self.input_map.lead_samples
+        return self.input_map.around.ahead
 
     def check_fixed(self) -> None:
         """Refuse a model whose means are those before each start."""

@@ -586,7 +586,7 @@ class Live:
             self._updates.clear()
             return
         self._finish(LATE)
-        if self._is_exact():
+        if not any(self._updates):
             return
         known = self._known_inputs()
         if self._ahead and self.signature.inputs:
@@ -597,14 +597,10 @@ class Live:
     def _finish(self, late: int = 0) -> None:
         """Judge samples whose estimates no wave to come moves; up to `late` complete ones wait."""
         final = len(self._updates) - max(self._ahead - 1, 0)
-        if final > self._is_exact() * late:
+        if final > (0 if any(self._updates) else late):
             self._find_rows(self._pending + final - 1, self._known_inputs())
             self._advance(self._history, final, is_final=True)
             del self._updates[:final]
-
-    def _is_exact(self) -> bool:
-        """Whether all samples whose estimates are not final are taken as they are."""
-        return not any(self._updates)
 
     @property
     def _pending(self) -> int:
@@ -755,10 +751,10 @@ class Live:
         signature, count = self.signature, whole_number(steps, "steps")
         scale = signature.state_scale
         level = fraction(level, "level")
-        if not self.ready:
+        if (missing := self._begins - self._count.taken) > 0:
             raise RequestError(
                 f"there are {self._count.taken} samples of history and the model needs "
-                f"{self._begins}. Call step {self._begins - self._count.taken} more times first."
+                f"{self._begins}. Call step {missing} more times first."
             )
         closed = self._closed()
         futures, freedom, known = self._futures(count, future, closed)
@@ -817,8 +813,8 @@ class Live:
             "known_input": max(known, 0),
             "diverged": len(values) - len(complete),
             "predictable": self._predictable(),
-            **({} if conditions is None else conditions.attrs()),
             "validity": validity.words,
+            **({} if conditions is None else conditions.attrs()),
             "consistency": worst,
         }
         return xr.Dataset(

@@ -412,7 +412,7 @@ def _problem(
     runs, states, inputs = given
     chain = widest.input_map(runs, states, inputs, widest.window)
     before = widest.reach(chain)
-    after = chain.after
+    after = chain.around.after
     pieces = dict(runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
         pieces = {}

@@ -5,12 +5,13 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from operator import getitem
 from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
+from seakeep.arrays import Datasets, FloatArray, Groups, undefined
 from seakeep.core.embedding import (
     Delayed,
     PrimalSystem,
@@ -140,6 +141,8 @@ class TrainingData:
             all_rows=settings.delay_rows == "ridge",
             radius=settings.radius,
         )
+        if not settings.memory:
+            return solution
         count, s = len(self.signature.states), settings.state_delays
         spread = spread_means(solution.coefficients, count, s, settings.blocks)
         return replace(solution, coefficients=spread)
@@ -162,6 +165,8 @@ def with_means(
     settings: HankelSettings, states: Sequence[FloatArray], direct: Sequence[FloatArray]
 ) -> list[FloatArray]:
     """Direct regressors of each run, and the means over blocks of its delayed states."""
+    if not settings.memory:
+        return [*direct]
     return [
         np.concatenate([own, block_means(x, settings.blocks)], axis=1)
         for own, x in zip(direct, states, strict=True)
@@ -232,7 +237,7 @@ def gather(
         needed = min(place.first, place.first_column - settings.state_reach)
         labelled.check_finite(here[needed - begin :], states, run, name, needed)
         needed = min(place.first, place.first_column - settings.input_delays)
-        span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
+        span = Span(begin, place.last, place.last + 1 - input_map.around.ahead)
         regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
         instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *regressors), shifted, instants))
@@ -264,7 +269,7 @@ def _place(
     reach = settings.reach(input_map)
     place = training_window(last, settings.window, settings.state_reach, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
-    final = last - input_map.after
+    final = last - input_map.around.after
     shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
     return place, shifted, slice(begin, final + 1)
 
@@ -290,7 +295,16 @@ def _standardised(
         for group in zip(*series, strict=True)
     ]
     channels = labels[0], *input_map.regressors(labels[1])
-    scales = scales_of(groups, windows, channels, settings.standardize, input_map.stretch)
+    counted = zip(*map(_counted, windows), strict=True)
+    states, delayed, direct = (
+        moments([*map(getitem, every, own)], named, settings.standardize)
+        for every, own, named in zip(groups, counted, channels, strict=True)
+    )
+    if input_map.follows is not None and settings.standardize:
+        by = input_map.stretch
+        delayed = replace(delayed, std=delayed.std * by[0])
+        direct = replace(direct, std=direct.std * by[1])
+    scales = states, delayed, direct
     x, u, w = (
         tuple(scale.deviations(values) for values in each)
         for scale, each in zip(scales, groups, strict=True)
@@ -366,7 +380,7 @@ class TrainingArrays:
             time = np.asarray(run["time"].values, dtype=float)
             end = time.size
             x = labelled.sound_matrix(run, states, name, slice(first, None))
-            span = Span(first, end - 1, max(end - input_map.lead_samples, first))
+            span = Span(first, end - 1, max(end - input_map.around.ahead, first))
             u, v = run_regressors(input_map, run, states, inputs, name, span)
             for values in (x, u, v):
                 values.flags.writeable = False
@@ -418,7 +432,8 @@ def run_regressors(
     span = span._replace(first=span.first + missing)
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
-    first = read.first if needed is None or not input_map.is_identity else needed
+    as_is = input_map.alignment is None and input_map.observed is None and not input_map.lead
+    first = needed if as_is and needed is not None else read.first
     labelled.check_finite(values[first : read.stop], inputs, run, name, first)
     surge = None
     if (follows := input_map.follows) is not None:
@@ -516,19 +531,14 @@ def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequ
     """Warn of channels that move in some runs and stand still in others."""
     for piece in pieces:
         seen = piece.series[group][piece.window.samples]
-        for column in np.flatnonzero(is_constant(seen) & (scale.spread > 0)).tolist():
+        # A constant that is not a binary fraction has a spread of rounding, not of zero.
+        still = np.ptp(seen, axis=0) <= 1e-12 * np.abs(seen).max(axis=0, initial=0.0)
+        for column in np.flatnonzero(still & (scale.spread > 0)).tolist():
             warn(
                 f"channel '{names[column]}' of {piece.name} is constant ({seen[0, column]:.6g}) "
                 "over its training window, and moves in other runs. If its sensor was dead, leave "
                 "this run out: the model would learn that nothing moves."
             )
-
-
-def is_constant(values: FloatArray) -> BoolArray:
-    """Channels, shape (channel,), that do not move; values are (time, channel)."""
-    # A constant that is not a binary fraction has a spread of rounding, not of zero.
-    largest = np.abs(values).max(axis=0, initial=0.0)
-    return np.ptp(values, axis=0) <= 1e-12 * largest
 
 
 def _check_length(
@@ -551,27 +561,6 @@ def _check_length(
             f"{needed - received} are missing. Reduce the delays, or give a longer "
             f"{'window' if history == 'inside' and window is not None else 'run'}."
         )
-
-
-def scales_of(
-    series: Sequence[Sequence[FloatArray]],
-    windows: Sequence[TrainingWindow],
-    channels: Sequence[Sequence[ChannelLabel]],
-    standardize: bool,
-    stretch: tuple[FloatArray, FloatArray] | None,
-) -> tuple[Scale, Scale, Scale]:
-    """Moments of states, delayed and direct regressors.
-
-    What regressors are divided by is stretched where λ weighs more on them.
-    """
-    counted = zip(*map(_counted, windows), strict=True)
-    x, u, w = (
-        moments([values[own] for values, own in zip(every, cut, strict=True)], labels, standardize)
-        for every, cut, labels in zip(series, counted, channels, strict=True)
-    )
-    if stretch is not None and standardize:
-        u, w = (replace(own, std=own.std * by) for own, by in zip((u, w), stretch, strict=True))
-    return x, u, w
 
 
 def _counted(window: TrainingWindow) -> tuple[slice, slice, slice]:

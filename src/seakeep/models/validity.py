@@ -118,9 +118,8 @@ class Conditions:
         return float(np.max(ratio, where=self.reasons[1], initial=1.0))
 
     def attrs(self) -> dict[str, Any]:
-        """Attributes of a forecast: validity by name, numbers of each input, and those trained."""
+        """Attributes of a forecast: numbers of each input, and those trained."""
         out: dict[str, Any] = {
-            "validity": self.validity.words,
             "height": self.heights,
             "trained_height": self.trained.heights,
             "steepness": self.steepnesses,
