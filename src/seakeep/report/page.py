@@ -181,9 +181,17 @@ def rendered(**content: Any) -> str:
     environment = templates("report")
     environment.globals["source"] = lambda name: Markup(folder.joinpath(name).read_text("utf-8"))
     environment.filters["shade"] = shade
-    environment.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
+    environment.filters["breakable"] = lambda text: escape(_set(text)).replace(
+        "_", Markup("_<wbr>")
+    )
     environment.filters["minus"] = with_minus
+    environment.finalize = lambda each: each if isinstance(each, Markup) else _set(str(each))
     return environment.get_template("report.html").render(**content)
+
+
+def _set(text: str) -> str:
+    """Words as they are set: with signs of minus, and no line that begins with a percent sign."""
+    return with_minus(text).replace(" %", "\u00a0%")
 
 
 def inline_picture(png: bytes, words: str) -> Markup:

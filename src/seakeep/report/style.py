@@ -41,7 +41,7 @@ COLOURS = {what: PALETTE[colour] for what, colour in _STYLE["colours"].items()}
 
 LINES = {what: _line(**each) for what, each in _STYLE["lines"].items()}
 """Lines differ in dash and width as well as in colour."""
-DASHED, DOTTED = LINES["forecast"]["linestyle"], (0, (1, 1))
+DASHED = LINES["forecast"]["linestyle"]
 
 SERIES = [_line(**each) | {"marker": marker} for marker, each in _STYLE["series"].items()]
 """Colour, dash and marker of each of several things of one kind."""
@@ -114,7 +114,7 @@ def legend_outside(*places: Any, side: str = "lower center", **options: Any) -> 
     if not unique:
         return None
     figure = places[0].figure
-    across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
+    across = max(1, int(13 * figure.get_figwidth() / (8 + max(map(len, unique)))))  # letters
     options |= {"loc": f"outside {side}", "ncols": min(len(unique), across)}
     return figure.legend(unique.values(), unique, **options)
 
@@ -145,14 +145,13 @@ def judged_models(result: StudyResult) -> list[str]:
 
 
 def line_of(result: StudyResult, model: str) -> dict[str, Any]:
-    """Line of a model: that of a forecast or an ensemble, in its own colour beyond the first."""
+    """Line of a model: that of a forecast, of an ensemble, or one of its own beyond the first."""
     singles = [name for name in result.models if name not in result.ensembles]
-    line = LINES["forecast" if model in singles else "ensemble"]
     first = (*singles[:1], *result.ensembles[:1])
     if model in first:
-        return line
+        return LINES["forecast" if model in singles else "ensemble"]
     others = [name for name in result.models if name not in first]
-    return {**line, "color": SERIES[2 + others.index(model) % (len(SERIES) - 2)]["color"]}
+    return {**SERIES[2 + others.index(model) % (len(SERIES) - 2)], "marker": None}
 
 
 def model_words(model: str) -> str:

@@ -10,10 +10,10 @@ from seakeep.conventions import displayed
 from seakeep.report.style import (
     COLOURS,
     DASHED,
-    DOTTED,
     LINES,
     MARKS,
     PALETTE,
+    SERIES,
     TESTS,
     Figure,
     Places,
@@ -27,6 +27,8 @@ from seakeep.report.style import (
 
 SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 POINTS = {"linestyle": "none", "elinewidth": 0.8}
+INPUTS = ("-", DASHED, ":") * 9
+"""Dashes of one input after the other."""
 
 
 def by_state(
@@ -92,9 +94,9 @@ def response(
                 **SHADE,
             )
             place.set(xlim=frequency[[0, -1]], xlabel="frequency [Hz]")
-        gain.plot(frequency, factor * own["amplitude"], **LINES["forecast"], label="model")
+        gain.plot(frequency, factor * own["amplitude"], **LINES["solid"], label="model")
         wraps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180)  # no line runs across
-        turn.plot(*np.insert([frequency, phase], wraps, np.nan, axis=1), **LINES["forecast"])
+        turn.plot(*np.insert([frequency, phase], wraps, np.nan, axis=1), **LINES["solid"])
         if "amplitude_lower" in own:
             bounds = (factor * own[f"amplitude_{each}"] for each in ("lower", "upper"))
             gain.fill_between(
@@ -148,8 +150,9 @@ def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
             linewidth=0,
             label="spectrum of the state",
         )
-        for ordinary in own["ordinary"]:
-            place.plot(frequency, ordinary, **LINES["input"], label="with one input")
+        for each, dash in zip(own["ordinary"], INPUTS, strict=False):
+            line = {**LINES["input"], "linestyle": dash}
+            place.plot(frequency, each, **line, label=plain_text(f"with {each['input'].item()}"))
         place.plot(frequency, own["multiple"], **LINES["measured"], label="with all inputs")
         if "multiple_observables" in own:
             place.plot(
@@ -258,8 +261,7 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
         white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
         white.set(xlabel="lag [s]", ylabel="autocorrelation [1]")
         white.set_title(f"{short_label(own['state'].item())}: errors of one step")
-        dashes = ("-", DASHED, ":") * 9
-        for each, dash in zip(own.get("input_correlation", ()), dashes, strict=False):
+        for each, dash in zip(own.get("input_correlation", ()), INPUTS, strict=False):
             wide = float(own["input_limit"].sel(input=each["input"]))
             past.axhspan(-wide, wide, **SHADE)
             past.plot(
@@ -275,14 +277,15 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
         frequency, power = own["frequency"][1:], own["measured_spectrum"].values
         top = power.max() if power.max() > 0 else 1.0
         spectrum.semilogy(
-            frequency, power[1:] / top, color=PALETTE["pale"], linewidth=0.8, label="measured"
+            frequency, power[1:] / top, color=PALETTE["grey"], linewidth=0.9, label="measured"
         )
         error = own["error_spectrum"].values[1:] / top
         spectrum.semilogy(frequency, error, **LINES["forecast"], label="error")
         spectrum.set(xlim=(0, end), xlabel="frequency [Hz]", ylabel="power over peak [1]")
         spectrum.set_ylim(bottom=1e-6)
-        spectrum.set_title("free runs")
-        age.plot(own["age"], own["age_nrmse"], **LINES["forecast"])
+        for place in (spectrum, age):
+            place.set_title("free runs")
+        age.plot(own["age"], own["age_nrmse"], **LINES["solid"])
         age.set_ylim(bottom=0)
         age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")
         if axes is not None:
@@ -329,7 +332,7 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
             place.semilogy(factor * at["peak"], at["exceedance"], mark, **style)
         place.set_ylim(0.3 / max(int(own["peaks"].max()), 1), 1.3)
         place.set_xlim(0, factor * level[-1])
-        place.set(xlabel=f"peak of {label} [{unit}]", ylabel="exceeded by [1]")
+        place.set(xlabel=f"peak of {label} [{unit}]", ylabel="share of peaks above [1]")
         place.locator_params("x", nbins=5)
     return place.figure
 
@@ -405,9 +408,8 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
         mean, *slow = factor * own["slow_response"]
         place.axhline(0.0, **LINES["zero"])
         place.plot(own["frequency"], mean, **LINES["solid"], label="model, mean")
-        dashes = (DASHED, DOTTED, (0, (5, 1, 1, 1)), (0, (8, 2)))
-        for each, dash in zip(slow, dashes, strict=False):
-            style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}
+        for each, line in zip(slow, SERIES, strict=False):
+            style = {**line, "color": COLOURS["ensemble"], "marker": None}
             words = f"model, difference {float(each['difference']):.3g} Hz"
             place.plot(own["frequency"], each, **style, label=words)
         if "offset" in own:

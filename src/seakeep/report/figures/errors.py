@@ -94,8 +94,6 @@ def _draw_boxes(
     Hatches set models apart in grey print. A logarithmic axis shows no violin, and no values that
     are not positive.
     """
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     logarithmic, tallest, whole = axes.get_yscale() == "log", 0.0, 0.84 / len(columns)
     width = 0.92 * whole
     for number, (model, of_model) in enumerate(columns.items()):
@@ -128,18 +126,26 @@ def _draw_boxes(
     axes.set_ylabel(f"{heading} [measured SD]")
     axes.grid(axis="x", visible=False)
     if logarithmic:
-        low, high = axes.dataLim.intervaly * (0.8, 1.25)
-        axes.set_ylim(low, high)
-        if high < 100.0 * low:
-            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_title("logarithmic axis", loc="right", fontsize=7)
+        _logarithmic(axes)
     elif 0 < 3 * tallest < axes.get_ylim()[1]:
         axes.set_ylim(0, 1.15 * tallest)
         axes.set_title("values above the axis are not shown", loc="right", fontsize=7)
     else:
         axes.set_ylim(bottom=0)
+
+
+def _logarithmic(axes: Any) -> None:
+    """Make the axis of errors logarithmic, with numbers that can be read, and say so."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.set_yscale("log")
+    low, high = axes.dataLim.intervaly * (0.8, 1.25)
+    axes.set_ylim(low, high)
+    if high < 100.0 * low:
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_title("logarithmic axis", loc="right", fontsize=7)
 
 
 def error_over_time_figure(result: StudyResult) -> Figure:
@@ -270,7 +276,7 @@ def error_figure(table: xr.Dataset) -> Figure:
     axes = figure.subplots()
     _draw_points(axes, table, "model", "anrmse", labels)
     if 0.0 < 10.0 * table["anrmse"].min() < table["anrmse"].max():
-        axes.set_yscale("log")
+        _logarithmic(axes)
     else:
         axes.set_ylim(bottom=0.0)
     where = " at full scale" * ("scale_factor" in table)
@@ -365,10 +371,8 @@ def tuning_figure(table: xr.Dataset) -> Figure:
         markersize=11,
         fillstyle="none",
         color="k",
-        label="chosen",
+        label=f"chosen: {names[np.argmax(table['chosen'].values)]}",
     )
-    axes.set_xlabel("ridge per snapshot pair (1)")
-    axes.set_ylim(bottom=0.0)
-    axes.legend(fontsize="small")
-    axes.set_ylabel("mean NRMSE of free runs (1)")
+    axes.set(xlabel="ridge per snapshot pair [1]", ylabel="mean NRMSE of free runs [SD], 95 %")
+    legend_outside(axes)
     return figure

@@ -20,7 +20,6 @@ from seakeep.quality.sensors import LATE, Agreement
 from seakeep.report.style import (
     COLOURS,
     DASHED,
-    DOTTED,
     FLAGGED,
     LINES,
     PALETTE,
@@ -98,7 +97,7 @@ def draw_history(axes: Any, time: Any, measured: Values, curves: Sequence[Curve]
         axes.fill_between(time, *each.band, label=each.words, color=each.line["color"], **band)
     axes.plot(time, measured, label="measured", **LINES["thin" if banded else "measured"])
     for each in curves:
-        edge = {**each.line, "linewidth": 0.7, "linestyle": DOTTED}
+        edge = {**each.line, "linewidth": 0.7, "linestyle": "-", "alpha": 0.6}
         for bound, label in zip(each.calibrated, ("calibrated", None), strict=False):
             axes.plot(time, bound, label=label, **edge)
         axes.plot(time, each.values, label=each.label, **each.line)
@@ -179,7 +178,6 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
             borderaxespad=0.0,
             ncols=columns,
             fontsize=LABEL,
-            handlelength=3.5,
         )
     figure.align_ylabels(axes[:, 0])
     for each in axes[-1]:
@@ -404,7 +402,7 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
         training = int(result.tests["irregular"]["judged"].values[:, 0].argmax())
         for axes, name in zip(row, CHANNELS, strict=True):
             _draw_channel(axes, result, ("irregular", training, 0), name)
-            axes.set_title(f"{act.title}: {name}")
+            axes.set_title(f"{act.title}: {plain_text(result.words_of(name))}")
     for axes in grid[-1]:
         axes.set_xlabel("time after the last measured state, in encounter periods")
     legend_outside(grid[0, 0], side="upper right")

@@ -23,7 +23,7 @@ MISSING = 65535
 
 def histories(result: StudyResult) -> Section:
     """Return figures of the cells that are shown."""
-    calibrated = ", and that band calibrated (dotted)" * result.is_calibrated
+    calibrated = ", and that band calibrated (thin lines)" * result.is_calibrated
     level = f"{100 * result.level:g}"
     bands = f"; of an ensemble its mean with its {level} % band{calibrated}"
     words = {"bands": bands * bool(result.ensembles)}
