@@ -48,15 +48,15 @@ def found(folder, door):
         tables = [campaign.model(), campaign.model().model_copy(update={"kind": ENSEMBLE})]
     else:
         act = next(act for act in ACTS if act.preset == "paper" and not act.without_drift)
-        says = '[study]\ncampaign = "../campaign/campaign.toml"\npreset = "paper"\n'
+        says = '[study]\ncampaign = "../campaign/campaign.toml"\n'  # the preset is left out
         file = folder / act.name / "study.toml"
         file.parent.mkdir()
         file.write_text(says if door == "study" else study_text(act, Size(), 0), "utf-8")
         read = read_study(file)
         campaign, study = read.campaign, read.settings
-        tables = list(study.models.values())[:2]
+        tables = [study.models[name] for name in ("deterministic", "bayesian")]
     aligned = can_align(campaign.settings, campaign.model().inputs)
-    above = study and "paper"
+    above = study and study.study.preset
     specs = [resolve_model(each, PERIOD, DT, preset=above, aligned=aligned).spec for each in tables]
     return SimpleNamespace(campaign=campaign, specs=specs, study=study)
 

@@ -25,14 +25,6 @@ def settings(**tables):
     return validated(StudySettings, content, "study.toml", "study")
 
 
-def test_what_is_left_out_is_the_papers():
-    stated = settings()
-    assert stated.study.preset == "paper"
-    kinds = {name: model.kind for name, model in stated.models.items()}
-    assert kinds == {"deterministic": "hankel_dmdc", "bayesian": "bayesian_hankel_dmdc"}
-    assert list(stated.tests) == ["irregular"]
-
-
 @pytest.mark.parametrize(
     ("words", "tables"),
     {
