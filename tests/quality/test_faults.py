@@ -38,15 +38,11 @@ def noisy():
     return x + 0.02 * x.std() * default_rng(1).standard_normal(x.size)
 
 
-def recorded(x):
-    group = flag_samples(record(DT, heave=x), PreparationSettings(), {})
-    return Record("r", group, {"": group})
-
-
 def reported(x):
     """Kinds of findings about samples."""
-    checks = flagged, constant, noise, levels
-    return {each.kind.name for check in checks for each in check(recorded(x))}
+    group = flag_samples(record(DT, heave=x), PreparationSettings(), {})
+    run, checks = Record("r", group, {"": group}), (flagged, constant, noise, levels)
+    return {each.kind.name for check in checks for each in check(run)}
 
 
 def faulty(x, kind, length, place):
