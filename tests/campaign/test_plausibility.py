@@ -80,8 +80,7 @@ def loggers(tmp_path):
 def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared):
     """The test run, of 2 s to 18 s, is a copy of the other."""
     (tank / "second.csv").write_bytes((tank / "first.csv").read_bytes())
-    whole = "train = [0, 10]\ntest = [10, inf]"
-    campaign = changed((whole, spans))
+    campaign = changed(("train = [0, 10]\ntest = [10, inf]", spans))
     words = (
         r"^second: file is one of first too, and both use it from 2 s to 18 s\. Correct it in \["
     )
@@ -252,9 +251,10 @@ def test_a_count_that_noise_leads_is_told(changed, tank, noise, seconds, part):
         noises = np.random.default_rng(seed).normal(0, noise, columns["Time [s]"].size)
         columns["WP fwd [mm]"] += noises
         write_csv(tank / f"{name}.csv", columns)
-    message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s"
-    rest = r"( \(second likewise\))?\. .*period_hysteresis"
-    with warned(message + rest):
+    with warned(
+        r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s"
+        r"( \(second likewise\))?\. .*period_hysteresis"
+    ):
         run = changed(COUNTED).prepare()["first"]
     assert run.attrs["encounter_period"] < sound / part
     assert [channel for channel, _ in told(run, "PERIOD")] == ["eta_fwd"]

@@ -29,9 +29,8 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(row, column, cell, ove
     rng, inside = default_rng(0), 0
     for _ in range(200):
         pair = (table(rng, row, column, cell, overlap) for _ in range(2))
-        blocks = overlap, overlap
         low, high = two_way_interval(
-            mean_of_difference, *pair, rng=rng, blocks=blocks, n_series=200
+            mean_of_difference, *pair, rng=rng, blocks=(overlap, overlap), n_series=200
         )
         inside += bool(low <= 0.0 <= high)
     # Nominally 0.95: 200 trials have a standard error of 0.015; overlapping neighbours leave five
