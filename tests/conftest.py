@@ -38,7 +38,6 @@ def vessel_run(samples=400, seed=0):
 
     waves = {"eta_fwd": noisy(eta_fwd) + 0.1, "eta_cog": noisy(eta_cog)}
     run = record(dt, heave=noisy(heave), pitch=noisy(pitch), **waves)
-    run["pitch"].attrs["units"] = "rad"
     run["time"].attrs = {"units": "s", "long_name": "time"}
     return run
 

@@ -107,9 +107,9 @@ CHANGES = {
         ("name, slice(first + 1, last + 1))", "name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ],
     "check/response.py": [
-        ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_that_of_python_control"),
+        ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ('replace(alignment.settings, surge="measured")', 'replace(alignment.settings, surge="none")', "check/test_response.py::test_measured_phases_count_from_the_waves_where_the_vessel_is"),
-        ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
+        ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("np.hypot(radius, np.abs(gain - other(spectra.frequency)))", "radius", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
         ("type_b = np.hypot(accuracy[1:], ratio * accuracy[0])", "type_b = np.hypot(accuracy[1:], 0 * ratio)", "check/test_response.py::test_accuracy_of_the_instruments_widens_the_interval"),
@@ -154,7 +154,7 @@ CHANGES = {
         ("h = np.where(h > 0, h, of_constant)", "h = np.where(h > 0, h, 2 * of_constant)", "statistics/test_density.py::test_a_redraw_that_is_constant_has_the_bandwidth_of_its_series_beside_a_narrow_one"),
         ("np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
         ("reach = h[:, None] * np.sqrt(2.0)", "reach = h[:, None]", "statistics/test_density.py::test_a_constant_series_has_a_density_of_a_stated_bandwidth"),
-        ("np.exp(-0.5 * (h[:, None] * angular) ** 2)", "np.exp(-((h[:, None] * angular) ** 2))", "statistics/test_density.py::test_densities_are_scipys"),
+        ("np.exp(-0.5 * (h[:, None] * angular) ** 2)", "np.exp(-((h[:, None] * angular) ** 2))", "statistics/test_density.py::test_bins_keep_their_promise_on_any_even_grid"),
     ],
     "core/embedding.py": [
         ("min(piece.count, delay + 1))", "min(piece.count, delay))", "core/test_fast_paths.py::test_the_trace_is_the_sum_of_squares"),

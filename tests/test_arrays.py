@@ -161,7 +161,6 @@ def test_what_is_taken_as_it_is():
         (lambda: as_bundle(TABLE[None]), RequestError, r"expected \(time,\) or \(series, time\)"),
         (lambda: number("3", "x"), RequestError, "x must be a number; received '3'"),
         (lambda: number(np.ma.masked, "x"), RequestError, "x must be a number"),
-        (lambda: number([1.0, 2.0], "x"), RequestError, "x must be a number"),
         (lambda: positive(0.0, "dt", "s"), RequestError, r"dt must be positive \(s\)"),
         (lambda: fraction(1.0, "level"), RequestError, "level must be between 0 and 1"),
         (lambda: whole_number(2.0, "n"), RequestError, "n must be an integer of at least 1"),

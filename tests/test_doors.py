@@ -10,14 +10,14 @@ from pages import page
 from places import ROOT
 from records import record
 from said import data_error, request_error, warned
-from tutorial_study import put_tutorial
+from tutorial_study import put_tutorial, studied
 
 import seakeep
 from seakeep import cli, formats, models, quality
 from seakeep.baselines import FIR
 from seakeep.core import Solution
 from seakeep.quality import Record, as_json, findings_of, warn_of
-from seakeep.study import fit_baselines, read_study, run_study
+from seakeep.study import fit_baselines
 
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
@@ -158,7 +158,7 @@ def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add,
 
     Own.solve = failing
     with pytest.raises(ValueError, match="it does not converge") as caught:
-        run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
+        studied(tmp_path)
     assert "model 'fading'" in caught.value.__notes__[0]
     assert cli._unforeseen(caught.value).startswith(f"{caught.value.__notes__[0]}: ValueError: it")
 
@@ -180,7 +180,7 @@ def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_p
     add("a section of the report", SECTIONS)
     del SECTIONS[:-2]  # the others take their time
     put_tutorial(tmp_path, STUDY)
-    run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
+    studied(tmp_path)
     text = write_report(read_result(tmp_path / "out")).read_text("utf-8")
     assert (tmp_path / "out/figures/sizes.svg").exists()
     assert (tmp_path / "out/tables/members.csv").read_text("utf-8").splitlines()[1:] == ["pair,2"]

@@ -12,6 +12,7 @@ import pytest
 import tomlkit
 import two_loggers
 import xarray as xr
+from altered import altered
 from places import ROOT
 
 from seakeep import SeakeepError, load_model, read_campaign
@@ -41,8 +42,8 @@ def written(name, folder):
         from seakeep.tank.settings import default_settings
 
         settings = default_settings()
-        run = settings.runs["irregular_1"].model_copy(update={"startup": 5.0, "duration": 90.0})
-        play(settings.model_copy(update={"runs": {"irregular_1": run}}), folder, kind="nc")
+        run = altered(settings.runs["irregular_1"], startup=5.0, duration=90.0)
+        play(altered(settings, runs={"irregular_1": run}), folder, kind="nc")
         text = (folder / "campaign.toml").read_text("utf-8")
         return re.sub("states = .*", 'states = ["surge", "heave", "pitch", "mooring_stern"]', text)
     return two_loggers.write(folder).read_text("utf-8")

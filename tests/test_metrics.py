@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
+from records import autoregressive
 from said import request_error
-from scipy.signal import lfilter
 
 from seakeep import metrics
 
@@ -133,8 +133,8 @@ def test_channels_are_matched_by_name_and_instants_by_time():
     assert np.isfinite(told.heave)
 
 
-def autoregression(rng, size):
-    return lfilter([1.0], [1.0, -0.9], rng.standard_normal(size + 200))[200:]
+def remembering(rng):
+    return autoregressive(rng.standard_normal(600), 0.9)[200:, None]
 
 
 @pytest.mark.parametrize(("white", "least"), [(False, 0.85), (True, 0.75)])
@@ -143,8 +143,8 @@ def test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says(white,
     rng, inside = default_rng(0), 0
     truth = 0.5  # an error of a quarter of the variance of the measurement
     for _ in range(60):
-        measured = autoregression(rng, 400)[:, None]
-        error = autoregression(rng, 400)[:, None]
+        measured = remembering(rng)
+        error = remembering(rng)
         if white:
             error = rng.standard_normal((400, 1)) / np.sqrt(1 - 0.9**2)
         pair = both(measured + truth * error, measured)

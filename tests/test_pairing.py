@@ -4,17 +4,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
+from records import record
 from said import data_error, request_error
 
 from seakeep import metrics
 from seakeep.pairing import pair
 
-TIME = 0.5 * np.arange(6)
 HEAVE, PITCH = np.random.default_rng(0).standard_normal((2, 6))
-MEASURED = xr.Dataset(
-    {"heave": ("time", HEAVE, {"units": "m"}), "pitch": ("time", PITCH, {"units": "rad"})},
-    coords={"time": TIME},
-)
+MEASURED = record(0.5, heave=HEAVE, pitch=PITCH)
 WINDOWS = xr.concat([MEASURED, MEASURED + 1, MEASURED + 2], dim="window")
 
 
@@ -59,7 +56,7 @@ def test_dimensions_that_do_not_fit_are_refused(predicted, measured, message):
 
 
 def test_the_instants_of_a_message_can_be_told_apart():
-    late = MEASURED.assign_coords(time=1.7e9 + TIME)
+    late = MEASURED.assign_coords(time=1.7e9 + MEASURED.time)
     message = (
         r"from 1700000000\.25 to 1700000002\.75 s and measured from 1700000000 to 1700000002\.5"
     )

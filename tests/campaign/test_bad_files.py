@@ -8,8 +8,8 @@ import h5py
 import matlab73
 import numpy as np
 import pytest
-import xarray as xr
 from numpy.testing import assert_array_equal
+from records import record
 from said import data_error, request_error, warned
 from scipy import io
 from small_tank import tank_columns, write_csv
@@ -20,7 +20,7 @@ from seakeep.errors import MissingFileError
 T = 0.05 * np.arange(400)
 HEAVE = np.sin(T)
 SERIES = {"time": T, "heave": HEAVE}
-RUN = xr.Dataset({"heave": ("time", HEAVE)}, {"time": ("time", T, {"units": "s"})})
+RUN = record(0.05, heave=HEAVE)
 
 
 def hdf5(path):

@@ -204,14 +204,6 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message
 
 
-def test_a_derived_rate_of_an_elevation(changed):
-    """It was refused: m/s against m."""
-    rate = '[derived.eta_fwd_rate]\nfrom = "eta_fwd"\nstep = "differentiate"\n[runs.first]'
-    campaign = changed(("[runs.first]", rate))
-    assert campaign.prepare(["first"])["first"]["eta_fwd_rate"].attrs["units"] == "m/s"
-    assert campaign.period_channel() == "eta_fwd"
-
-
 def test_named_models_are_found_by_their_names(changed):
     campaign = changed(
         ("[model]", "[models.small]"),

@@ -4,13 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from said import data_error, warned
+from said import data_error, findings, warned
 from seas import sea
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep import DataError, RequestError
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.quality import findings_of
 from seakeep.signals import encounter_period
 
 POOLED = ("sampling_rate = 10", "steps_per_period = 12")
@@ -32,7 +31,7 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
     assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
     assert abs(alone / both - 1) > 1e-3
-    told = [each for each in findings_of(run) if each.kind.word == "left out"]
+    told = findings(run, "LEFT_OUT")
     assert [each.channel for each in told] == ["run second"]
     assert "run 'second' is left out of the encounter period" in told[0].text
     refused, written = RequestError if content is None else DataError, []
@@ -45,8 +44,7 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     write_csv(damaged, tank_columns(1))
     write_prepared(campaign)
     assert kept.stat().st_mtime_ns > written[0]
-    left_out = findings_of(load_prepared(campaign)["first"])
-    assert not [each for each in left_out if each.kind.word == "left out"]
+    assert not findings(load_prepared(campaign)["first"], "LEFT_OUT")
 
 
 @pytest.mark.usefixtures("empty_sheet")

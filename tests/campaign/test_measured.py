@@ -15,17 +15,11 @@ pytestmark = pytest.mark.data
 FLUME, BASIN = "ntnu_ship_section", "sjtu_semisub"
 
 
-def files_of(name):
-    folder = Path(os.environ["SEAKEEP_DATA_DIR"]) / name
-    files = sorted(folder.glob("*.csv"))
-    if not files:
-        pytest.skip(f"{name} is not in SEAKEEP_DATA_DIR")
-    return files
-
-
 @pytest.mark.parametrize("name", [FLUME, BASIN])
 def test_draft(tmp_path, name):
-    files = files_of(name)
+    files = sorted((Path(os.environ["SEAKEEP_DATA_DIR"]) / name).glob("*.csv"))
+    if not files:
+        pytest.skip(f"{name} is not in SEAKEEP_DATA_DIR")
     path = tmp_path / "campaign.toml"
     path.write_text(draft_campaign(files, tmp_path), "utf-8")
     campaign = read_campaign(path)

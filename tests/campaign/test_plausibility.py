@@ -5,7 +5,7 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from said import data_error, warned
+from said import data_error, findings, warned
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
@@ -47,8 +47,8 @@ CLOCKS = ("ASSUMED_CLOCK", "TIMES_ASIDE", "OTHER_RATE")
 RECORDS = ("STARTS_LATE", "ENDS_EARLY")
 
 
-def told(run, kinds):
-    return [(each.channel, each.text) for each in findings_of(run) if each.kind.name in kinds]
+def told(run, *kinds):
+    return [(each.channel, each.text) for each in findings(run, *kinds)]
 
 
 SPANS = "train = [0, 10]\ntest = [10, 20]"
@@ -80,14 +80,13 @@ def loggers(tmp_path):
 def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared):
     """The test run, of 2 s to 18 s, is a copy of the other."""
     (tank / "second.csv").write_bytes((tank / "first.csv").read_bytes())
-    whole = "train = [0, 10]\ntest = [10, inf]"
-    campaign = changed((whole, spans))
+    campaign = changed(("train = [0, 10]\ntest = [10, inf]", spans))
     words = (
         r"^second: file is one of first too, and both use it from 2 s to 18 s\. Correct it in \["
     )
     with warned(words) if shared else nullcontext():
         runs = campaign.prepare()
-    found = [each for each in findings_of(runs["second"]) if each.kind.name == "FILE"]
+    found = findings(runs["second"], "FILE")
     assert [(each.place, each.value) for each in found] == ([shared] if shared else [])
 
 
@@ -107,12 +106,12 @@ def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
 
 
 def test_clocks_of_which_nothing_is_said_are_assumed_the_same(loggers, tmp_path):
-    found = told(loggers().prepare()["first"], CLOCKS)
+    found = told(loggers().prepare()["first"], *CLOCKS)
     assert [channel for channel, _ in found] == ["mru"]
     assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
     stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
     path = edit(tmp_path / "campaign.toml", stated)
-    assert not told(read_campaign(path).prepare()["first"], CLOCKS)
+    assert not told(read_campaign(path).prepare()["first"], *CLOCKS)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +122,7 @@ def test_clocks_of_which_nothing_is_said_are_assumed_the_same(loggers, tmp_path)
 )  # fmt: skip
 def test_a_rate_against_the_times(first, files, text):
     run = first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
-    found = told(run, CLOCKS)
+    found = told(run, *CLOCKS)
     assert [each[0] for each in found] == ([] if text is None else ["time"])
     assert text is None or found[0][1].startswith(text)
 
@@ -181,7 +180,7 @@ def test_a_motion_from_a_column_of_waves(first):
 )  # fmt: skip
 def test_what_a_coarse_step_loses_is_told(first, chain, fate):
     run = first(("sampling_rate = 10", chain))
-    found = dict(told(run, ("COARSE_STEP", "FINE_STEP")))
+    found = dict(told(run, "COARSE_STEP", "FINE_STEP"))
     assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
     assert fate is None or re.search(fate, found["eta_fwd"])
 
@@ -214,7 +213,7 @@ def test_a_low_pass_longer_than_the_record(first):
 def test_a_logger_that_was_cut_off_is_told(loggers, ends, words, span):
     with warned(f"first: mru {words}"):
         run = loggers(*ends).prepare()["first"]
-    assert [text.startswith(words) for _, text in told(run, RECORDS)] == [True]
+    assert [text.startswith(words) for _, text in told(run, *RECORDS)] == [True]
     assert run.attrs["test_span"] == pytest.approx(span)
 
 
@@ -224,7 +223,7 @@ def test_a_logger_that_was_cut_off_is_told(loggers, ends, words, span):
      ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
 )  # fmt: skip
 def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(loggers, ends, spans):
-    assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
+    assert not told(loggers(*ends, spans).prepare()["first"], *RECORDS)
 
 
 @pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])
@@ -248,7 +247,7 @@ def test_faults_outside_the_span_are_none_of_the_run(changed, tank, role, places
     columns["Pitch (deg)"][690:] = columns["Pitch (deg)"][690]
     write_csv(tank / "second.csv", columns)
     run = changed(("span = [2, 18]", role)).prepare(["second"])["second"]
-    flagged = [each for each in findings_of(run) if each.kind.name in ("OUTLIERS", "STUCK")]
+    flagged = findings(run, "OUTLIERS", "STUCK")
     assert [each.place for each in flagged] == pytest.approx(places)
 
 
@@ -265,12 +264,13 @@ def test_a_count_that_noise_leads_is_told(changed, tank, noise, seconds, part):
         noises = np.random.default_rng(seed).normal(0, noise, columns["Time [s]"].size)
         columns["WP fwd [mm]"] += noises
         write_csv(tank / f"{name}.csv", columns)
-    message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s"
-    rest = r"( \(second likewise\))?\. .*period_hysteresis"
-    with warned(message + rest):
+    with warned(
+        r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s"
+        r"( \(second likewise\))?\. .*period_hysteresis"
+    ):
         run = changed(COUNTED).prepare()["first"]
     assert run.attrs["encounter_period"] < sound / part
-    assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
+    assert [channel for channel, _ in told(run, "PERIOD")] == ["eta_fwd"]
 
 
 @pytest.mark.parametrize(

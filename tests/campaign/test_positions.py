@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from said import warned
+from said import findings, warned
 from seas import sea
 from small_tank import write_csv
 
@@ -70,7 +70,7 @@ def test_still_water_and_noise_place_no_probes(campaign, tmp_path):
     write_csv(path, {"time [s]": time, **still})
     for waves in ("still", "irregular"):
         run = campaign(-400.0, waves).prepare(["two"])["two"]
-        assert not [each for each in findings_of(run) if each.kind.word == "position"]
+        assert not findings(run, "POSITION")
 
 
 def test_a_probe_in_another_unit_is_kept_until_its_file_is_repaired(campaign, tmp_path):

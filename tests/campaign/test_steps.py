@@ -7,13 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from said import data_error
+from said import data_error, findings
 from seas import sea
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep import read_campaign
-from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 
 AXES, G = ("surge", "sway", "heave"), 9.81
@@ -242,11 +241,11 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
 
 def test_a_sensor_that_sticks_is_reported_in_times_that_jitter(tmp_path):
     t, rng = np.arange(0, 120, 0.05), np.random.default_rng(0)
-    x = 0.05 * np.sin(2 * np.pi * 0.38 * t)
+    x = 0.05 * np.sin(tau * 0.38 * t)
     x[1000:1040] = x[1000]
     text = "[channels.eta_a]\n[preparation]\njitter = 'interpolate'\nsampling_rate = 10\n"
     run = prepared(tmp_path, {"eta_a [m]": x}, text, t + 6e-4 * rng.uniform(-1, 1, t.size))
-    (stuck,) = [each for each in findings_of(run) if each.kind.word == "stuck"]
+    (stuck,) = findings(run, "STUCK")
     assert stuck.details["samples"] == 40
 
 

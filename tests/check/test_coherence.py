@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from records import record
+from records import autoregressive, record
 from said import data_error
 from scipy import signal
 
@@ -20,7 +20,7 @@ RNG = np.random.default_rng
 def run():
     """Heave answers the wave and, uncorrelated with it, the wave's square: half of its SD."""
     rng = RNG(0)
-    wave = signal.lfilter([1.0], [1.0, -0.5], rng.standard_normal(12000))
+    wave = autoregressive(rng.standard_normal(12000), 0.5)
     wave /= wave.std()
     linear = signal.lfilter([0.0, 1.0, 0.6], [1.0], wave)
     square = np.roll(wave**2 - 1, 1)

@@ -16,17 +16,6 @@ from seakeep.check.parts import samples_in
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
 
 
-def measured_decay_run():
-    """A heave released from 1 m, with linear and quadratic damping."""
-
-    def rate(_, s):
-        return [s[1], -2 * 0.02 * FREQUENCY * s[1] - 0.3 * abs(s[1]) * s[1] - 4 * s[0]]
-
-    time = DT * np.arange(900)
-    found = scipy.integrate.solve_ivp(rate, (0, time[-1]), [1.0, 0.0], t_eval=time, rtol=1e-8)
-    return record(DT, {"waves": "still"}, heave=found.y[0])
-
-
 def fitted(ratio, centre=0):
     spec = HankelDMDc(0, 0, 1e-9, centre=centre)
     return spec.fit(Oscillator(ratio, DT).run(2000), ["heave", "heave_rate"], ["eta_fwd"])
@@ -64,7 +53,15 @@ def test_modes_say_which_states_take_part(model):
 
 
 def test_quadratic_damping_is_found_from_a_decay(model):
-    found = check.measured_decay(model, {"still": measured_decay_run()})
+    """A heave released from 1 m, with linear and quadratic damping."""
+
+    def rate(_, s):
+        return [s[1], -2 * 0.02 * FREQUENCY * s[1] - 0.3 * abs(s[1]) * s[1] - 4 * s[0]]
+
+    time = DT * np.arange(900)
+    made = scipy.integrate.solve_ivp(rate, (0, time[-1]), [1.0, 0.0], t_eval=time, rtol=1e-8)
+    run = record(DT, {"waves": "still"}, heave=made.y[0])
+    found = check.measured_decay(model, {"still": run})
     assert found.motion.item() == "heave"
     # Equivalent linearisation: p = 2πζ, q = 8b/3, to second order in the damping, of which large
     # swings, which count most, have more.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
-from records import record
+from records import autoregressive, record
 from scipy import signal
 
 from seakeep import HankelDMDc, check
@@ -15,9 +15,9 @@ from seakeep.core.spectra import autocorrelation, input_correlation, ljung_box
 def run():
     """Heave answers the wave one and two samples before, with white process noise."""
     rng = default_rng(0)
-    wave = signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(3000))
+    wave = autoregressive(rng.standard_normal(3000), 0.8)
     driven = 0.5 * np.roll(wave, 1) + 0.3 * np.roll(wave, 2) + 0.2 * rng.standard_normal(3000)
-    heave = signal.lfilter([1.0], [1.0, -0.6], driven)
+    heave = autoregressive(driven, 0.6)
     attrs = {"encounter_period": 2.0, "test_span": (150.0, 299.9)}
     return record(0.1, attrs, eta=wave, heave=heave)
 
@@ -68,8 +68,8 @@ def test_records_shorter_than_the_lags_add_what_they_have():
 
 def test_limits_of_the_correlation_with_inputs_cover_as_they_say():
     rng = default_rng(2)
-    wave = signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((2000, 1)), axis=0)
-    errors = signal.lfilter([1.0], [1.0, -0.5], rng.standard_normal((2000, 500)), axis=0)
+    wave = autoregressive(rng.standard_normal((2000, 1)), 0.9, axis=0)
+    errors = autoregressive(rng.standard_normal((2000, 500)), 0.5, axis=0)
     found, limit = input_correlation([(errors, wave)], 40)
     inside = np.abs(found[:, :, 0]) < limit[:, 0]
     # 500 repetitions know a coverage of 95 % to 1 % (one SD) at each of 41 lags.

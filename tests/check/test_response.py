@@ -8,7 +8,7 @@ import pytest
 from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run
 from moored import moored_run
 from numpy.random import default_rng
-from records import record
+from records import record, rms
 from seas import Sea
 
 from seakeep import HankelDMDc, check
@@ -16,12 +16,12 @@ from seakeep.check.parts import reference_probe
 from seakeep.core.spectra import estimate, harmonic_fits
 
 DT, DEPTH, PLACES = 0.1, 3.6, {"eta_fwd": -1.5, "eta_cog": 0.0}
-FREQUENCIES = np.array([0.3, 0.5, 0.8, 1.7])
+FREQUENCIES = np.array([0.3, 0.5, 0.8])
 
 
 def answer(frequency):
     """Heave per wave at the vessel: 0.8 of the wave 0.2 s before, 0.4 of that 0.5 s before."""
-    turn = -2j * np.pi * np.asarray(frequency)
+    turn = -1j * tau * np.asarray(frequency)
     return 0.8 * np.exp(0.2 * turn) + 0.4 * np.exp(0.5 * turn)
 
 
@@ -55,40 +55,28 @@ def model(sea):
     return spec.fit(sea, ["heave"], ["eta_fwd", "eta_cog"])
 
 
-@pytest.mark.oracle
 @pytest.mark.parametrize("rows", ["exact", "ridge"])
-def test_the_response_is_that_of_python_control(rows):
-    control = pytest.importorskip("control")
-    spec = HankelDMDc(4, 6, 0.1, delay_rows=rows)
-    model = spec.fit(moored_run(), ["surge", "heave", "pitch"], ["eta"])
-    found = check.response(model, FREQUENCIES)
-    system = model.to_control()
-    known = control.frequency_response(system, tau * FREQUENCIES).frdata
-    # The same matrices, solved in another order: rounding times the condition of the system.
-    assert np.abs(phasors(found) - known).max() < 1e-9 * np.abs(known).max()
-
-
-def test_the_response_is_what_a_free_run_settles_to():
-    lead = HankelDMDc(2, 4, 0.1, delay_rows="exact", lead=3)
+def test_the_response_is_what_a_free_run_settles_to(rows):
+    lead = HankelDMDc(2, 4, 0.1, delay_rows=rows, lead=3)
     model = lead.fit(moored_run(), ["surge", "heave"], ["eta"])
     t = 0.1 * np.arange(-900, 900)
     wave = 1e-3 * np.cos(tau * 0.8 * t)
     rest = np.tile(model.state_mean, (900, 1))
     forecast = model.forecast_arrays(rest, wave[:900, None], wave[900:, None], 800)
     found = check.response(model, [0.8]).isel(input=0, frequency=0)
-    turn = np.exp(2j * np.pi * 0.8 * 0.1 * np.arange(800))
+    turn = np.exp(1j * tau * 0.8 * 0.1 * np.arange(800))
     still = forecast[-200:] - (1e-3 * phasors(found) * turn[-200:, None]).real
     # The mean of the input was not zero, so the run settles to another level: a constant is left.
     assert np.ptp(still, axis=0) == pytest.approx([0, 0], abs=1e-9)
 
 
 def test_a_passing_wave_adds_the_probes(sea, model):
-    found = check.response(model, FREQUENCIES[:3], {"sea": sea})
+    found = check.response(model, FREQUENCIES, {"sea": sea})
     assert list(found["input"].values) == ["eta_fwd", "eta_cog", "wave"]
     assert found.attrs["reference"] == "eta_cog"
     wave = found.sel(input="wave", state="heave")
     # Sensor noise of 1e-5 beside waves of 0.1 m, and the ridge.
-    assert np.abs(phasors(wave) - answer(FREQUENCIES[:3])).max() < 2e-3
+    assert np.abs(phasors(wave) - answer(FREQUENCIES)).max() < 2e-3
     assert found.trained.sel(input="wave").values.tolist() == [True, True, True]
     assert not check.response(model, [2.5]).trained.any()
 
@@ -133,7 +121,7 @@ def test_measured_phases_count_from_the_waves_where_the_vessel_is():
     regular = found.kind.values == "regular"
     assert error[regular] < 0.01
     # From the probe this drift of 0.6 m both ways, by up to 100°, leaves half of the answer.
-    assert np.sqrt(np.mean(error[~regular] ** 2)) < 0.1
+    assert rms(error[~regular]) < 0.1
 
 
 def test_accuracy_of_the_instruments_widens_the_interval(model):
@@ -156,7 +144,7 @@ def test_intervals_of_a_harmonic_fit_cover_as_they_say():
     time = DT * np.arange(900)
     wave = np.cos(tau * 0.5 * time)
     truth = 0.7 * np.exp(0.4j)
-    clean = (truth * np.exp(2j * np.pi * 0.5 * time)).real
+    clean = (truth * np.exp(1j * tau * 0.5 * time)).real
     many = clean[:, None] + 0.3 * rng.standard_normal((900, 500))
     harmonics, means = harmonic_fits(np.column_stack([wave, many]), DT, 0.5)
     found = estimate(harmonics[:, 1:] / harmonics[:, :1], np.zeros(500))

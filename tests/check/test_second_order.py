@@ -35,7 +35,7 @@ def test_drift_of_a_square_is_its_own():
     settled = REGULAR.isel(time=slice(300, None))
     found = check.drift(model, {"sea": drifting_run(), "regular": settled})
     # η² has the mean a²/2, and a²/2 cos Δt of each wave of a pair: G = 0.3 / (e^{iΔ} − 0.9).
-    turn = np.exp(2j * np.pi * found.difference.values * DT)
+    turn = np.exp(1j * tau * found.difference.values * DT)
     law = 0.5 * GAIN / np.abs(turn - MEMORY)
     ours = found.slow_response.sel(state="surge").values
     assert ours == pytest.approx(np.repeat(law[:, None], ours.shape[1], 1), rel=1e-4)  # the ridge

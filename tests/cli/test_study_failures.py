@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tutorial_study import edit
+from tutorial_study import edit, studied
 
 from seakeep import RequestError
-from seakeep.study import read_study, run_study
 from seakeep.study.run import compute, units_of
 from seakeep.study.store import UnitFolder
 
@@ -111,8 +110,7 @@ def test_a_unit_that_fails_says_what_is_kept_and_how_to_go_on(study_folder, monk
     assert "the second fails. What was finished is kept (1 of 4 units): the same command" in told
     before = units_in(study_folder)
     assert len(before) == 1
-    result = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    assert np.isfinite(result.tests["unseen"]["error"]).any()
+    assert np.isfinite(studied(study_folder).tests["unseen"]["error"]).any()
 
 
 def filling(room, opened=Path.open):
@@ -142,5 +140,5 @@ def test_a_disk_that_fills_up_loses_no_finished_unit(study_folder, monkeypatch, 
         study(1)
     assert not (folder / "out" / "study.nc").exists()
     assert before.items() <= units_in(folder).items()
-    run_study(read_study(folder / "study.toml"), folder / "out")
+    studied(folder)
     assert (folder / "out" / "study.nc").exists()

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 
 import pytest
+from compiled import need_compiler
 from loaded import loaded
 from pages import page, play
 from places import ROOT
@@ -61,8 +62,7 @@ def test_a_study(tutorial, monkeypatch):
 def test_other_programs_whose_c_prints_what_python_does(tutorial):
     for name in ("fmpy", "onnx", "onnxruntime"):
         pytest.importorskip(name)
-    if shutil.which("cc") is None:
-        pytest.skip("there is no C compiler")
+    need_compiler()
     play(HOSTS)
     programs, shells = (
         re.findall(rf"^```{kind}\n(.*?)^```$", HOSTS, re.M | re.S) for kind in ("c", "sh")

@@ -1,9 +1,7 @@
 """The examples in service: the C estimator on a run, and a thruster that is planned."""
 
-import shutil
-
 import numpy as np
-import pytest
+from compiled import need_compiler
 from loaded import loaded
 from places import ROOT
 from records import record, rms
@@ -15,8 +13,7 @@ EXAMPLES = ROOT / "examples"
 
 
 def test_the_c_estimator_is_python_where_a_tenth_is_lost(make_run, tmp_path):
-    if shutil.which("cc") is None:
-        pytest.skip("there is no C compiler")
+    need_compiler()
     example = loaded(EXAMPLES / "in_service/play_c.py")
     model = seakeep.HankelDMDc(4, 8, 1.0).fit(make_run(), ["heave", "pitch"], ["eta_fwd"])
     estimates, ahead, outside, lost = example.play(model, make_run(500, 3), tmp_path)

@@ -43,7 +43,6 @@ def drifting_run(seed=0, samples=1500, moved=0.0):
     }
     attrs = {"water_depth": DEPTH, "run": "run", "encounter_period": 1.5}
     run = record(DT, attrs, **channels)
-    run["mooring_bow"].attrs["units"] = "N"
     for key, x in POSITIONS.items():
         run[key].attrs["x_position"] = x
     return run

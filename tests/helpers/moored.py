@@ -29,10 +29,7 @@ def moored_run(seed=0, slack=True):
     loads = np.stack([40.0 - 20.0 * surge, stern]) + NOISE * rng.standard_normal((2, t.size))
     values = np.stack([surge, heave, pitch, *loads, eta])[:, 200:]
     attrs = {"encounter_period": PERIOD * DT, "run": f"run{seed}", "waves": "irregular"}
-    run = record(DT, attrs, **dict(zip(STATES + INPUTS, values, strict=True)))
-    for name, units in zip(STATES[2:], ("rad", "N", "N"), strict=True):
-        run[name].attrs["units"] = units
-    return run
+    return record(DT, attrs, **dict(zip(STATES + INPUTS, values, strict=True)))
 
 
 def moored_runs(**more):

@@ -1,15 +1,18 @@
-"""Runs made of arrays, in metres, arrays of runs, and how large their values are."""
+"""Runs made of arrays, arrays of runs, noise with a memory, and how large values are."""
 
 import numpy as np
 import xarray as xr
+from scipy.signal import lfilter
+
+from seakeep.conventions import canonical_channel
 
 
 def record(step, /, attrs=None, **channels):
-    """A run whose samples are `step` seconds apart; rates are in m/s."""
+    """A run whose samples are `step` seconds apart; channels of free names are in metres."""
     samples = len(next(iter(channels.values())))
     return xr.Dataset(
         {
-            name: ("time", x, {"units": "m/s" if name.endswith("_rate") else "m"})
+            name: ("time", x, {"units": getattr(canonical_channel(name), "units", "m")})
             for name, x in channels.items()
         },
         {"time": step * np.arange(samples)},
@@ -32,3 +35,8 @@ def arrays_at(model, run, start):
 def rms(values):
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def autoregressive(noise, part, axis=-1):
+    """Series of which each value is a part of the one before, and noise."""
+    return lfilter([1.0], [1.0, -part], noise, axis=axis)

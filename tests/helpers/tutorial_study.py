@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from places import ROOT
 
 from seakeep.models.labelled import nearest_sample
+from seakeep.study import read_study, run_study
 
 TUTORIAL = ROOT / "docs/tutorial"
 STUDY = """
@@ -48,6 +49,15 @@ def put_tutorial(folder, study=STUDY):
         if path.suffix in (".toml", ".csv"):
             shutil.copy(path, folder)
     (folder / "study.toml").write_text(study, "utf-8")
+
+
+def study_of(folder):
+    return read_study(folder / "study.toml")
+
+
+def studied(folder):
+    """Result of the study in a folder."""
+    return run_study(study_of(folder), folder / "out")
 
 
 def edit(path, *pairs):

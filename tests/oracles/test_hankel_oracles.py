@@ -73,6 +73,15 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, d
     assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
 
 
+def test_a_system_of_python_control_has_the_step_and_the_names(run):
+    """What it forecasts: the tutorial, in `tests/docs/test_pages.py`."""
+    pytest.importorskip("control")
+    model = fit(run, 3, 1)
+    system = model.to_control()
+    assert system.dt == model.dt
+    assert (system.input_labels, system.output_labels) == (model.inputs, model.states)
+
+
 def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     rng = np.random.default_rng(0)
     n, q, m, s, z, ridge = 11, 2, 640, 32, 160, 100.0

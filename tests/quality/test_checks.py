@@ -159,7 +159,6 @@ def test_what_stands_still_has_no_lag():
 )
 def test_waves_that_none_of_their_period_is(height, slower, stated, told):
     run = record(DT * slower, eta_fwd=height / 8**0.5 * np.sin(tau * T / PERIOD))
-    run["eta_fwd"].attrs["units"] = "m"
     found = [*waves_of(Record("r", run, stated_period=stated))]
     assert [each.kind.name for each in found] == told
     assert not [*waves_of(Record("r", run, stated_period=stated, waves="still"))]
@@ -169,7 +168,6 @@ def test_waves_that_none_of_their_period_is(height, slower, stated, told):
 def test_a_gauge_that_counts_from_elsewhere_than_still_water(level, told):
     """Waves of 0.13 m."""
     run = record(DT, eta_fwd=level + 0.13 / 8**0.5 * np.sin(tau * T / PERIOD))
-    run["eta_fwd"].attrs["units"] = "m"
     values = [each.value for each in waves_of(Record("r", run))]
     assert values == [pytest.approx(level, rel=1e-3)] * told  # waves in parts at the end
 
@@ -177,8 +175,6 @@ def test_a_gauge_that_counts_from_elsewhere_than_still_water(level, told):
 def test_channels_that_hold_no_wave_are_left():
     lost = np.where(T < 2 * DT, 0.1, np.nan)
     run = record(DT, eta_fwd=np.full(T.size, np.nan), eta_aft=lost, surge=lost)
-    for name in ("eta_fwd", "eta_aft", "surge"):
-        run[name].attrs["units"] = "m"
     assert not [*waves_of(Record("r", run))]
 
 

@@ -1,5 +1,7 @@
 """Faults of samples of every length are found, and sound series are left alone."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -29,7 +31,7 @@ PERIOD = 1.6
 def waves():
     frequency = np.linspace(0.4, 0.9, 20)
     phase = default_rng(0).uniform(0, 6.28, 20)
-    return np.cos(2 * np.pi * np.outer(T, frequency) + phase).sum(axis=1)
+    return np.cos(tau * np.outer(T, frequency) + phase).sum(axis=1)
 
 
 @pytest.fixture
@@ -38,15 +40,11 @@ def noisy():
     return x + 0.02 * x.std() * default_rng(1).standard_normal(x.size)
 
 
-def recorded(x):
-    group = flag_samples(record(DT, heave=x), PreparationSettings(), {})
-    return Record("r", group, {"": group})
-
-
 def reported(x):
     """Kinds of findings about samples."""
-    checks = flagged, constant, noise, levels
-    return {each.kind.name for check in checks for each in check(recorded(x))}
+    group = flag_samples(record(DT, heave=x), PreparationSettings(), {})
+    run, checks = Record("r", group, {"": group}), (flagged, constant, noise, levels)
+    return {each.kind.name for check in checks for each in check(run)}
 
 
 def faulty(x, kind, length, place):
@@ -127,7 +125,7 @@ def test_at_rest_around_the_waves_is_not_held(noisy):
     assert not find_held(noisy, DT).any()
     assert not find_held(noisy, DT, waves() * (np.arange(3000) >= 600)).any()
     assert find_held(noisy, DT, waves()).sum() == 601  # a witness that moved
-    decay = np.exp(-0.1 * np.clip(T - 80, 0, None) * 2 * np.pi / PERIOD)
+    decay = np.exp(-0.1 * np.clip(T - 80, 0, None) * tau / PERIOD)
     x = np.round(waves() * decay, 1)
     assert not find_held(x, DT).any()
 

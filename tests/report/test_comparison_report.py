@@ -171,6 +171,15 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     assert only.title == "long: change of ANRMSE from ours"
 
 
+def assert_labels_fit(figure):
+    """No label reaches beyond its panel, or the figure."""
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        label = axes.yaxis.label.get_window_extent()
+        assert label.height <= axes.get_window_extent().height
+        assert label.x0 >= 0
+
+
 def test_names_of_ten_runs_and_long_ones_of_channels_do_not_meet():
     pytest.importorskip("matplotlib")
     from seakeep.report.figures.checks import coherence
@@ -191,9 +200,7 @@ def test_names_of_ten_runs_and_long_ones_of_channels_do_not_meet():
         coords={"state": names, "input": ["eta"], "frequency": [0.1, 0.2, 0.3]},
     )
     figure = coherence(result)
-    figure.draw_without_rendering()
-    for axes in figure.axes:
-        assert axes.yaxis.label.get_window_extent().height <= axes.get_window_extent().height
+    assert_labels_fit(figure)
 
 
 @pytest.mark.parametrize(("lead_time", "words"), [(0.5, "0.500"), (2.0, "at least 2.000")])
@@ -295,11 +302,7 @@ def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit(
     assert angles.get_ylabel() == "inputs\n[deg]"
     for axes, words in ((waves, ["probe ahead of the bow", *many]), (angles, ["rudder", "fin"])):
         assert [text.get_text() for text in axes.get_legend().get_texts()] == words
-    figure.draw_without_rendering()
-    for axes in figure.axes:  # no label reaches beyond its panel
-        label = axes.yaxis.label.get_window_extent()
-        assert label.height <= axes.get_window_extent().height
-        assert label.x0 >= 0
+    assert_labels_fit(figure)
 
 
 @pytest.mark.parametrize(

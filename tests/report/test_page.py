@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 from tables import rows_of
-from tutorial_study import STUDY, put_tutorial
+from tutorial_study import STUDY, put_tutorial, studied
 
 from seakeep.files import check_report
 from seakeep.report.sections.results import (
@@ -23,7 +23,7 @@ from seakeep.report.sections.results import (
     summary,
 )
 from seakeep.report.tables import WORDS
-from seakeep.study import read_result, read_study, run_study
+from seakeep.study import read_result
 
 pytest.importorskip("matplotlib")
 
@@ -43,7 +43,7 @@ NAMED = STUDY.replace("seed = 3", CHANNELS).replace("length = 6", 'length = 6\nl
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     put_tutorial(folder, NAMED)
-    return write_report(run_study(read_study(folder / "study.toml"), folder / "out"))
+    return write_report(studied(folder))
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from records import rms
 
 pytest.importorskip("matplotlib")
 
@@ -30,4 +31,4 @@ def test_a_picture_is_the_figure(tmp_path):
     difference = np.asarray(found, float) - np.asarray(expected, float)
     # 128 colours of a line drawing lie some steps of 255 from the many shades of its edges.
     assert np.abs(difference).max() < 32
-    assert np.sqrt(np.mean(difference**2)) < 3
+    assert rms(difference) < 3

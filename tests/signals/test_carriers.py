@@ -26,15 +26,12 @@ def spectrum():
     return mean_spectrum(records, DT, PERIOD)
 
 
-def designed(spectrum, targets, **changes):
-    options = {"probes": PROBES, "back": BACK, "ahead": AHEAD} | changes
-    leads = np.full(len(targets), options.pop("lead", LEAD))
-    return carriers(*spectrum, DEPTH, DT, targets=np.array(targets), leads=leads, **options)
-
-
 def test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design(spectrum):
-    places, waves = (-0.4, 0.0, 0.7, 1.3), sea(9)
-    taps, errors = designed(spectrum, places)
+    places, waves = np.array([-0.4, 0.0, 0.7, 1.3]), sea(9)
+    taps, errors = carriers(
+        *spectrum, DEPTH, DT, probes=PROBES, back=BACK, ahead=AHEAD, targets=places,
+        leads=np.full(4, LEAD),
+    )  # fmt: skip
     found = carried(taps, recorded(waves))
     for column, place in enumerate(places):
         true = waves.at(TIME + LEAD * DT, place)[BACK:-AHEAD]

@@ -7,8 +7,7 @@ import pytest
 import seas
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from records import rms
-from scipy.signal import lfilter
+from records import autoregressive, rms
 
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import (
@@ -150,7 +149,7 @@ def test_departures_of_a_sea_are_the_errors_of_its_prediction():
 
 def test_the_power_of_innovations_is_that_of_a_known_process():
     series = default_rng(1).standard_normal((6000, 1))
-    found = foresee(1.0 + 2.0 * lfilter([1.0], [1.0, -0.8], series, axis=0), 30, dt=0.1,
+    found = foresee(1.0 + 2.0 * autoregressive(series, 0.8, axis=0), 30, dt=0.1,
                     positions=[np.nan], depth=3.6)  # fmt: skip
     # 6000 samples tell an SD to a hundredth.
     assert found.departures[0, :3, 0] == pytest.approx([2.0, 1.6, 1.28], rel=0.05)

@@ -5,16 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.random import default_rng
+from records import autoregressive
 from said import warned
-from scipy.signal import lfilter
 
 from seakeep import DataError, RequestError
 from seakeep.statistics import block_length, lag_one_correlation, moving_block_bootstrap
 
 
-def autoregressive(phi, samples, seed):
-    noise = default_rng(seed).standard_normal(samples + 500)
-    return lfilter([1.0], [1.0, -phi], noise)[500:]
+def series(phi, samples, seed):
+    return autoregressive(default_rng(seed).standard_normal(samples + 500), phi)[500:]
 
 
 # --- block lengths -------------------------------------------------------------------------------
@@ -24,14 +23,14 @@ def autoregressive(phi, samples, seed):
 def test_carlstein_finds_the_closed_form_of_an_autoregression(phi):
     samples = 40_000
     expected = (2 * abs(phi) / (1 - phi**2)) ** (2 / 3) * samples ** (1 / 3)
-    found = block_length(autoregressive(phi, samples, 1))
+    found = block_length(series(phi, samples, 1))
     # The standard error of φ is √((1 − φ²)/T) = 0.002 to 0.004; the optimum's logarithm moves by
     # up to 7 times that at φ = 0.9: 6 % is more than three standard errors.
     assert found == pytest.approx(expected, rel=0.06)
 
 
 def test_the_lag_one_correlation_is_the_printed_sum_with_its_square():
-    x = np.concatenate([autoregressive(0.9, 200, 3), 50 + autoregressive(0.9, 200, 4)])
+    x = np.concatenate([series(0.9, 200, 3), 50 + series(0.9, 200, 4)])
     centred = x - x.mean()
     pairs = [i for i in range(399) if i != 199]
     by_hand = 400 * sum(centred[i + 1] * centred[i] for i in pairs) / (398 * sum(centred**2))
@@ -45,7 +44,7 @@ def test_politis_white_agrees_with_arch(phi):
     arch = pytest.importorskip("arch.bootstrap")
     ratios = []
     for seed in range(20):
-        x = autoregressive(phi, 2000, seed)
+        x = series(phi, 2000, seed)
         theirs = float(arch.optimal_block_length(x)["circular"].iloc[0])
         ratios.append(block_length(x, "politis_white") / round(theirs))
     # The same sums: equal, unless a correlation lies so near its threshold that the two

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy import signal, stats
+from records import autoregressive
+from scipy import stats
 
 from seakeep.core.bands import (
     band_scale,
@@ -34,7 +35,7 @@ def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
     held, plain, worth = [], [], []
     for _ in range(400):
         noise = np.sqrt(1 - 0.95**2) * rng.standard_normal((6, 200, 1))
-        scores = signal.lfilter([1.0], [1.0, -0.95], noise, axis=1)[:, 100:]
+        scores = autoregressive(noise, 0.95, axis=1)[:, 100:]
         for found, out in (
             (conformal_margin(scores, 0.9), held),
             (conformal_margin(scores, 0.9, block_length=1), plain),
@@ -48,19 +49,15 @@ def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
     assert np.median(worth) < 600 / 5
 
 
-def learnable(windows, steps, seed):
+def test_a_learnt_scale_is_the_one_that_the_errors_have():
     """Errors whose scale goes with the spread, with the waves, and grows over the horizon."""
-    rng = default_rng(seed)
-    envelope = np.exp(rng.normal(0.0, 0.5, (windows, steps)))
-    std = np.exp(rng.normal(0.0, 0.5, (windows, steps, 1)))
-    horizon = (1.0 + np.arange(steps))[:, None]
+    rng = default_rng(0)
+    envelope = np.exp(rng.normal(0.0, 0.5, (400, 50)))
+    std = np.exp(rng.normal(0.0, 0.5, (400, 50, 1)))
+    horizon = (1.0 + np.arange(50))[:, None]
     sigma = 0.4 * std**0.5 * envelope[..., None] ** 0.8 * horizon**0.3
     mean = rng.standard_normal(sigma.shape)
-    return mean, std, mean + sigma * rng.standard_normal(sigma.shape), envelope, sigma
-
-
-def test_a_learnt_scale_is_the_one_that_the_errors_have():
-    mean, std, y, envelope, sigma = learnable(400, 50, 0)
+    y = mean + sigma * rng.standard_normal(sigma.shape)
     floor = 1e-3 * spread_floor(mean, y)  # the spread alone, and no floor
     law = learn_scale(mean, std, y, envelope, floor)
     # 20,000 normal errors know a logarithm of their scale to 1/√40,000; the ridge takes 0.1 %.

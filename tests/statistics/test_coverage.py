@@ -24,7 +24,7 @@ def test_each_channel_and_window_is_judged_alone():
     assert np.all(found.inside == [1.0, 0.0])
     assert np.all(found.below == [0.0, 1.0])
     # Differences of sums of numbers of order one.
-    assert found.width == pytest.approx(np.broadcast_to([3.0, 1.0], (3, 2)), rel=1e-12)
+    assert_allclose(found.width, [[3.0, 1.0]] * 3, rtol=1e-12)
     expected = np.array([3.0, 1.0]) / measured.std(axis=1, ddof=1)
     assert found.relative_width == pytest.approx(expected, rel=1e-12)
 

@@ -4,22 +4,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.random import default_rng
+from records import record
 from said import data_error
 
 from seakeep import statistics
 from seakeep.core import bootstrap as core_bootstrap
 from seakeep.core import density as core_divergence
 
-TIME = np.arange(400) / 32
 HEAVE, PITCH = default_rng(0).standard_normal((2, 400)).cumsum(axis=1)
-MEASURED = xr.Dataset(
-    {
-        "heave": ("time", HEAVE, {"units": "m"}),
-        "pitch": ("time", PITCH, {"units": "deg"}),
-        "surge": ("time", PITCH + HEAVE, {"units": "m"}),
-    },
-    coords={"time": TIME},
-)
+MEASURED = record(1 / 32, heave=HEAVE, pitch=PITCH, surge=PITCH + HEAVE)
 PREDICTED = 0.9 * MEASURED[["pitch", "heave"]]
 
 
@@ -33,10 +26,10 @@ def test_a_dataset_is_redrawn_in_step():
     assert np.array_equal(drawn["heave"], plain)
     # Sums of the same numbers.
     assert np.array_equal(drawn["surge"], drawn["pitch"] + drawn["heave"])
-    assert drawn["pitch"].attrs["units"] == "deg"
-    assert np.array_equal(drawn["time"], TIME)
+    assert drawn["pitch"].attrs["units"] == "rad"
+    assert drawn["time"].equals(MEASURED["time"])
     assert redrawn(MEASURED["heave"]).identical(drawn["heave"])
-    gap = MEASURED.where(MEASURED.time != TIME[3])
+    gap = MEASURED.where(MEASURED.time != MEASURED.time[3])
     with data_error("channel 'heave' holds 1 value"):
         redrawn(gap)
 
@@ -62,6 +55,6 @@ def test_coverage_of_each_channel():
     found = statistics.coverage(whole - 1 + shift, whole + 1 + shift, MEASURED)
     assert found["inside"].dims == ("window", "channel")
     assert found["inside"].values.tolist() == [[1.0, 1.0], [0.0, 0.0]]
-    assert found["unit"].values.tolist() == ["m", "deg"]
+    assert found["unit"].values.tolist() == ["m", "rad"]
     # The difference of numbers of order 100.
     assert found["width"].values == pytest.approx(2.0, rel=1e-12)

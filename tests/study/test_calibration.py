@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tutorial_study import edit
+from tutorial_study import edit, studied
 
-from seakeep.study import read_study, run_study
+from seakeep.study import read_study
 from seakeep.study.plan import make_plan
 from seakeep.study.run import Unit, compute, facts_of
 
@@ -19,8 +19,7 @@ def edited(folder, *changes):
 def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder):
     stated = ("n_series = 8", 'n_series = 8\nscale = "learnt"')
     study = edited(study_folder, ("length = 6", "length = 3"), stated)
-    found = run_study(study, study_folder / "out")
-    plan = make_plan(study)
+    found, plan = studied(study_folder), make_plan(study)
     kept = found.groups["calibration"].sel(ensemble="bayesian")
     steps = plan.tests["unseen"][0].steps
     inside = []
@@ -101,12 +100,12 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
 def test_sets_without_a_window_that_is_not_read_or_tests_have_no_margin(
     study_folder, training, unread, judged
 ):
-    study = edited(
+    edited(
         study_folder,
         ("windows = 2\n\n[models", f"{training}\n\n[models"),
         ('window = { uniform = ["10 T", "20 T"] }\n', ""),
     )
-    found = run_study(study, study_folder / "out")
+    found = studied(study_folder)
     kept = found.groups["calibration"].sel(ensemble="bayesian")
     assert list(kept["training"].values) == list(unread)
     windows = kept["windows"].values > 0

@@ -6,10 +6,10 @@ from math import tau
 import numpy as np
 import pytest
 import xarray as xr
+from tutorial_study import study_of
 
 from seakeep import SeakeepWarning
 from seakeep.report.tables import MISSING
-from seakeep.study import read_study
 from seakeep.study.plan import make_plan
 from seakeep.study.reproduce import ACTS, HIGH_PASS, SLOW, Size, reproduce, study_text
 
@@ -93,7 +93,7 @@ def test_all_acts_have_the_same_windows_and_the_recommended_model_learns_from_ot
     folder = results["paper"].folder.parent
     text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(folder / "campaign"))
     (tmp_path / "study.toml").write_text(text, "utf-8")
-    plan = make_plan(read_study(tmp_path / "study.toml"))
+    plan = make_plan(study_of(tmp_path))
     for each in plan.training:
         assert not set(each.left_out) & set(each.runs)
     assert list(results) == ["paper", "raw"]

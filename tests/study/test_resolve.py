@@ -12,12 +12,6 @@ NORMAL = {"distribution": "norm", "parameters": {"loc": 15, "scale": 1}, "unit":
 READ = {"heave": "auto"}
 
 
-def resolved(stated, period=2.0, **how):
-    """With an encounter period of 2 s and steps of 0.1 s."""
-    table = {"states": ("heave", "pitch"), "inputs": ("eta_fwd",), **stated}
-    return resolve_model(ModelSettings.model_validate(table), period, 0.1, **how)
-
-
 @pytest.mark.parametrize(
     ("stated", "how", "expected"),
     [
@@ -58,11 +52,6 @@ def resolved(stated, period=2.0, **how):
             {"select.horizon": ([15.0], "stated"), "select.folds": ("run", "stated")},
         ),
         (
-            {"preset": "paper"},
-            {"aligned": True},
-            {"alignment.mode": ("effective", "preset"), "alignment.surge": ("measured", "preset")},
-        ),
-        (
             {"kind": "fir"},
             {"preset": "paper", "aligned": True},
             {"input_delays": (60, "preset"), "alignment.surge": ("measured", "preset")},
@@ -94,7 +83,10 @@ def resolved(stated, period=2.0, **how):
     ],
 )  # fmt: skip
 def test_each_key_has_its_value_and_its_source(stated, how, expected):
-    told = json.loads(json.dumps(resolved(stated, **how).description))
+    """With an encounter period of 2 s and steps of 0.1 s."""
+    table = {"states": ("heave", "pitch"), "inputs": ("eta_fwd",), **stated}
+    found = resolve_model(ModelSettings.model_validate(table), 2.0, 0.1, **how)
+    told = json.loads(json.dumps(found.description))
     settings = told["settings"]
     assert {key: (settings[key]["value"], settings[key]["source"]) for key in expected} == expected
     assert told["n_members"] == stated.get("n_members", 100 if told["ensemble"] else 1)

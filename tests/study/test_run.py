@@ -9,7 +9,12 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
-from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
+from tutorial_study import (
+    assert_cells_are_what_the_models_say,
+    assert_same,
+    put_tutorial,
+    study_of,
+)
 
 from seakeep import DataError, RequestError
 from seakeep.executor import processes
@@ -29,7 +34,7 @@ def finished_once(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
     put_tutorial(folder)
     with processes(1) as pool:
-        return run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
+        return run_study(study_of(folder), folder / "out", executor=pool)
 
 
 @pytest.fixture
@@ -40,8 +45,14 @@ def finished(study_folder, finished_once):
     return replace(finished_once, folder=folder)
 
 
+def assert_was_finished(study, folder, finished):
+    told = []
+    assert_same(finished, run_study(study, folder, progress=lambda *each: told.append(each[2])))
+    assert told == ["finished before"]
+
+
 def test_cells_are_what_the_models_say(study_folder, finished):
-    plan = make_plan(read_study(study_folder / "study.toml"))
+    plan = make_plan(study_of(study_folder))
     # Windows side by side are one product: sums in another order, about 1e-13.
     assert_cells_are_what_the_models_say(finished, plan, rtol=1e-9, atol=1e-11)
 
@@ -68,7 +79,7 @@ def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_cha
 
 
 def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, finished):
-    study, out, told = read_study(study_folder / "study.toml"), study_folder / "stopped", []
+    study, out, told = study_of(study_folder), study_folder / "stopped", []
 
     def stop(done, total, what):
         if done == 3 and "training set" in what:  # both models of one, and one of the next
@@ -88,7 +99,7 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
 
 
 def test_one_process_works_in_a_folder(study_folder, finished):
-    study, out = read_study(study_folder / "study.toml"), study_folder / "shared"
+    study, out = study_of(study_folder), study_folder / "shared"
     refused = []
 
     def second(done, total, what):
@@ -100,9 +111,7 @@ def test_one_process_works_in_a_folder(study_folder, finished):
     assert_same(finished, run_study(study, out, progress=second))  # without workers
     assert refused
     assert not (out / LOCK).exists()
-    told = []
-    assert_same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
-    assert told == ["finished before"]
+    assert_was_finished(study, out, finished)
 
 
 @pytest.mark.parametrize("change", [lambda x: x[:40], lambda x: x[:130] + b"4" + x[131:]])
@@ -137,10 +146,9 @@ def test_units_of_other_versions_are_not_mixed_with_those_of_this_one(tmp_path, 
 
 
 def test_a_finished_study_says_itself_which_it_is(study_folder, finished, tmp_path):
-    study, told = read_study(study_folder / "study.toml"), []
+    study = study_of(study_folder)
     shutil.copy(finished.folder / RESULT, tmp_path)
-    assert_same(finished, run_study(study, tmp_path, progress=lambda *each: told.append(each[2])))
-    assert told == ["finished before"]
+    assert_was_finished(study, tmp_path, finished)
     with request_error("holds the results of another study"):
         UnitFolder(tmp_path, "two").check()
     (tmp_path / RESULT).write_bytes(b"")
@@ -223,7 +231,7 @@ length = 6
 
 def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(tmp_path):
     put_tutorial(tmp_path, OPEN)
-    study = read_study(tmp_path / "study.toml")
+    study = study_of(tmp_path)
     plan = make_plan(study)
     facts = facts_of(study, plan)
     single, ensemble, mean = units_of(plan)
@@ -237,7 +245,7 @@ def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(t
 
 
 def described(folder):
-    study = read_study(folder / "study.toml")
+    study = study_of(folder)
     return describe_study(study, make_plan(study))
 
 
@@ -272,7 +280,7 @@ def test_a_study_with_short_windows_is_told_once(study_folder, monkeypatch):
         size = 3 * np.sqrt(2) * table[heave].std()
         table[heave] += np.outer(np.sin(2 * np.pi * time / DRIFT), size)
         table.to_csv(path, sep=";", index=False, float_format="%.6g")
-    study = read_study(study_folder / "study.toml")
+    study = study_of(study_folder)
     plan = make_plan(study)
     with warned(r"slow motion of heave \(period [56]\d") as caught:
         warn_of_slow_study(plan)

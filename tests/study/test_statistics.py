@@ -9,14 +9,13 @@ from cells import cells
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from said import warned
-from tutorial_study import STUDY, put_tutorial
+from tutorial_study import STUDY, put_tutorial, studied, study_of
 
 from seakeep import statistics
 from seakeep.core.density import density_grid
 from seakeep.metrics import nrmse
 from seakeep.models.training import gather, system_of
 from seakeep.report.tables import ratio_of
-from seakeep.study import read_study, run_study
 from seakeep.study.judge import (
     MEASURES,
     band_tables,
@@ -36,7 +35,7 @@ def found(tmp_path_factory):
     """A study whose truth is known: the measurement of heave, half a centimetre higher."""
     folder = tmp_path_factory.mktemp("study")
     put_tutorial(folder, STUDY.replace("seed = 3", 'seed = 3\ntruth = "truth"'))
-    run = make_plan(read_study(folder / "study.toml")).runs["unseen"]
+    run = make_plan(study_of(folder)).runs["unseen"]
     (folder / "truth").mkdir()
     time = run["time"].values
     half = (time[1] - time[0]) / 2
@@ -44,7 +43,7 @@ def found(tmp_path_factory):
     heave = np.interp(finer, time, run["heave"].values) + 0.005
     true = xr.Dataset({"heave": ("time", heave)}, {"time": finer})
     true.to_netcdf(folder / "truth" / "unseen.nc", engine="h5netcdf")
-    return run_study(read_study(folder / "study.toml"), folder / "out")
+    return studied(folder)
 
 
 def test_a_training_set_that_judges_no_window_stands_beside_those_that_do():
@@ -83,7 +82,7 @@ def test_divergences_are_those_of_the_joined_windows(found, variant, block, band
 
 
 def test_a_forecast_that_runs_far_away_moves_no_density_of_another(found):
-    settings = read_study(found.folder.parent / "study.toml").settings
+    settings = study_of(found.folder.parent).settings
     test, (kept, wild) = found.tests["unseen"].copy(deep=True), found.models
     before = density_tables(test, found.channels, settings, "unseen", None)["divergence"]
     test["mean"].loc[{"model": wild}] *= 300.0
@@ -184,7 +183,7 @@ def test_forecasts_that_diverge_are_named_and_count_as_infinite(tmp_path):
         r"^6 forecast\(s\) diverged: model 'wild', training set 't00', window 0 "
         r"of 'unseen' \(unseen from .* and 1 more"
     ):
-        found = run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
+        found = studied(tmp_path)
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}
     boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
@@ -216,7 +215,11 @@ def test_differences_between_models_have_intervals_and_verdicts():
     test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
     noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
     test["error"].loc[{"model": "noisy", "measure": "nrmse"}] *= noise
-    found = difference_table(test, TRAINING, rng).sel(measure="nrmse")
+
+    def differences():
+        return difference_table(test, TRAINING, rng).sel(measure="nrmse")
+
+    found = differences()
     # The same cells but for a factor: no draw can tell another change than the factor's.
     for key in ("change", "lower", "upper"):
         assert_allclose(found[key].sel(model="good", other="same"), -0.2, rtol=1e-12)
@@ -230,11 +233,10 @@ def test_differences_between_models_have_intervals_and_verdicts():
         assert ratio_of(at).cells()[2] == words
     # Where few redraws lose more than half of the cells, the bound on that side alone is infinite.
     test["error"].loc[{"model": "same", "window": slice(3)}] = np.inf
-    found = difference_table(test, TRAINING, rng).sel(measure="nrmse", channel="average")
-    at = found.sel(model="same", other="good")
+    at = differences().sel(model="same", other="good", channel="average")
     assert 0 < at["lower"] < at["change"] < np.inf == at["upper"]
     test["error"].loc[{"model": "same"}] = np.inf
-    found = difference_table(test, TRAINING, rng).sel(measure="nrmse", channel="average")
+    found = differences().sel(channel="average")
     assert np.isinf(found["lower"].sel(model="same", other="good"))
     assert found["upper"].sel(model="good", other="same") == -1.0
     told = [found[key].attrs["long_name"] for key in ("change", "lower", "upper")]
@@ -289,13 +291,12 @@ regularisation = true
 
 def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
     put_tutorial(tmp_path, STUDY + REGULARISED)
-    study = read_study(tmp_path / "study.toml")
-    found = run_study(study, tmp_path / "out")
+    found = studied(tmp_path)
     assert [name for name in found.groups if name.startswith("regularisation/")] == [
         "regularisation/printed"  # neither exact delay rows nor an ensemble
     ]
     at = found.groups["regularisation/printed"].isel(training=1)
-    plan = make_plan(study)
+    plan = make_plan(study_of(tmp_path))
     parts, *channels = plan.taught(plan.training[1].spans)
     spec = plan.specs["printed"]
     fitted = spec.fit(parts, *channels)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from seas import Sea
 from small_tank import write_csv
-from tutorial_study import assert_cells_are_what_the_models_say
+from tutorial_study import assert_cells_are_what_the_models_say, studied, study_of
 
-from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
 
 # The runs are short, for speed: their windows hold two periods of the slow surge of 17 s.
@@ -99,12 +98,11 @@ def test_cells_and_statistics_of_both_sets_are_what_the_models_say(tmp_path):
     write_run(tmp_path / "wave.csv", 3, 40, [0.6], grows=10.0)
     (tmp_path / "campaign.toml").write_text(CAMPAIGN, "utf-8")
     (tmp_path / "study.toml").write_text(STUDY, "utf-8")
-    study = read_study(tmp_path / "study.toml")
-    found = run_study(study, tmp_path / "out")
+    found = studied(tmp_path)
     assert found.conditional_on == {}
     # The record is read up to the end of the last window of its run, and continued by prediction
     # from there: alone, a window ends with less of it.
-    assert_cells_are_what_the_models_say(found, make_plan(study), rtol=0, atol=3e-6)
+    assert_cells_are_what_the_models_say(found, make_plan(study_of(tmp_path)), rtol=0, atol=3e-6)
     for test, windows, seconds in (("later", 2, 12.8), ("regular", 3, 8.0)):
         assert found.tests[test].sizes["window"] == windows
         assert found.tests[test]["time"][-1] == pytest.approx(seconds)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from altered import altered
 from filelock import FileLock
 
 from seakeep.campaign import load_prepared, write_prepared
@@ -59,10 +60,10 @@ def ideal_rig(linear_rig):
 def short(settings):
     """One irregular and one regular run, half a minute each."""
     runs = {
-        name: settings.runs[name].model_copy(update={"startup": 10.0, "duration": 20.0})
+        name: altered(settings.runs[name], startup=10.0, duration=20.0)
         for name in ("irregular_1", "regular_2")
     }
-    return settings.model_copy(update={"runs": runs})
+    return altered(settings, runs=runs)
 
 
 @of_all_tests

@@ -3,6 +3,7 @@ from math import tau
 
 import numpy as np
 import pytest
+from altered import altered
 from numpy.testing import assert_allclose
 from said import request_error
 from scipy.integrate import cumulative_simpson
@@ -203,9 +204,9 @@ def test_divergence_names_time_and_degree_of_freedom(rig):
      ("density", 1025.0, r"density is 1025 .* made for 1000\.")],
 )  # fmt: skip
 def test_depth_and_density_must_be_those_of_the_file(settings, hydro, key, value, words):
-    facility = settings.facility.model_copy(update={key: value})
+    facility = altered(settings.facility, **{key: value})
     with request_error(words):
-        assemble_rig(settings.model_copy(update={"facility": facility}), hydro)
+        assemble_rig(altered(settings, facility=facility), hydro)
 
 
 def test_other_vessels_need_no_code(settings, hydro):
@@ -222,8 +223,8 @@ def test_other_vessels_need_no_code(settings, hydro):
         far_field=hydro.far_field[:, :, :4, :4],
         **square,
     )
-    lines = {"single": settings.moorings["bow"].model_copy(update={"pretension": 0.0})}
-    other = settings.model_copy(update={"moorings": lines})
+    lines = {"single": altered(settings.moorings["bow"], pretension=0.0)}
+    other = altered(settings, moorings=lines)
     rig = assemble_rig(other, plain)
     motion = simulate(rig, wave(2.8, 0.1), 30.0)
     assert len(motion.position) == 3

@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from altered import altered
 from numpy.random import default_rng
 
 from seakeep.tank.instruments import _immersed, clock_instants, record_run, slap_pulses, trigger
@@ -46,8 +47,8 @@ def test_noise_is_what_is_stated(records, played, short):
 
 
 def test_second_order_crest_of_a_regular_wave(settings, rig):
-    steady = settings.runs["regular_2"].model_copy(update={"unsteadiness": 0.0})
-    played = play_run(settings.model_copy(update={"runs": {"one": steady}}), "one", rig)
+    steady = altered(settings.runs["regular_2"], unsteadiness=0.0)
+    played = play_run(altered(settings, runs={"one": steady}), "one", rig)
     t = np.arange(30.0, 40.0, 0.01)
     k, a = played.sea.wavenumber[0], played.sea.amplitude[0]
     angle = k * (50.0 - 52.09) - played.sea.omega[0] * t + played.sea.phase[0]
@@ -56,9 +57,9 @@ def test_second_order_crest_of_a_regular_wave(settings, rig):
 
 
 def test_dropouts_take_the_stated_share(settings, rig):
-    probes = {"us": settings.instruments.probes["us_fwd"].model_copy(update={"dropouts": 0.05})}
-    instruments = settings.instruments.model_copy(update={"probes": probes})
-    made = settings.model_copy(update={"instruments": instruments})
+    probes = {"us": altered(settings.instruments.probes["us_fwd"], dropouts=0.05)}
+    instruments = altered(settings.instruments, probes=probes)
+    made = altered(settings, instruments=instruments)
     record = record_run(play_run(made, "irregular_1", rig), default_rng(0))["wave_probes"]
     lost = np.isnan(record["us"].values)
     # About 120 bursts of uniform length: the share scatters by a tenth.
@@ -71,8 +72,8 @@ def test_slap_is_on_the_measured_load_alone(records, played, short):
     _, t = clock_instants(short.instruments.clocks["loads"], played.length)
     error = records["loads"]["mooring_bow"].values - played.loads(t)[0]
     assert error.std() > 1.2 * short.instruments.load_noise
-    instruments = short.instruments.model_copy(update={"slap": {}})
-    quiet = replace(played, settings=short.model_copy(update={"instruments": instruments}))
+    instruments = altered(short.instruments, slap={})
+    quiet = replace(played, settings=altered(short, instruments=instruments))
     again = record_run(quiet, default_rng(1))["loads"]
     error = again["mooring_bow"].values - played.loads(t)[0]
     assert error.std() == pytest.approx(short.instruments.load_noise, rel=0.02)

@@ -50,12 +50,12 @@ def test_components_hold_the_energy_of_the_band():
     # √(2EΔf); the paper's √(4πEΔf) would give 0.37 m instead of 0.147 m.
     assert 0.5 * np.sum(sea.amplitude**2) == pytest.approx(variance, rel=5e-3)
     assert sea.omega.size == 100
-    assert sea.omega[[0, -1]] / (tau) == pytest.approx([0.28, 1.13])
+    assert sea.omega[[0, -1]] / tau == pytest.approx([0.28, 1.13])
 
 
 def test_jitter_keeps_each_component_in_its_bin():
     spectrum = SpectrumSettings(height=0.15, peak_period=2.12, components=40)
-    f = irregular_sea(spectrum, 3.6, rng()).omega / (tau)
+    f = irregular_sea(spectrum, 3.6, rng()).omega / tau
     bins = np.floor((f - 0.28) / (0.85 / 40))
     assert np.array_equal(bins, np.arange(40))
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from altered import altered
 from numpy.testing import assert_allclose
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
@@ -13,11 +14,11 @@ pytest.importorskip("numba")
 
 @pytest.fixture(scope="module")
 def filmed(settings):
-    run = settings.runs["regular_2"].model_copy(update={"startup": 0.0, "duration": 14.0})
+    run = altered(settings.runs["regular_2"], startup=0.0, duration=14.0)
     clocks = dict(settings.instruments.clocks)
-    clocks["video"] = clocks["video"].model_copy(update={"rate": 10.0})  # fewer frames to render
-    instruments = settings.instruments.model_copy(update={"clocks": clocks})
-    return settings.model_copy(update={"runs": {"one": run}, "instruments": instruments})
+    clocks["video"] = altered(clocks["video"], rate=10.0)  # fewer frames to render
+    instruments = altered(settings.instruments, clocks=clocks)
+    return altered(settings, runs={"one": run}, instruments=instruments)
 
 
 @pytest.fixture(scope="module")
