@@ -41,7 +41,7 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
         # Windows side by side are summed in another order than one by one.
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-9)
     pytest.importorskip("matplotlib")
-    legend = result.figure().axes[0].get_legend().get_texts()
+    legend = result.figure().legends[0].get_texts()
     drawn = [each.get_text().split(",")[0] for each in legend[:-1]]
     assert set(drawn) == {f"kind {kind}" for kind in ("hankel_dmdc", *kinds)}
     # A vessel with a memory stays a Hankel model.
