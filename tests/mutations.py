@@ -40,8 +40,9 @@ CHANGES = {
         ('"time" in kinds_of(column) and', "False and", "campaign/test_drafts.py::test_times_that_jitter_are_told_by_a_word_of_their_name"),
     ],
     "campaign/live_chain.py": [
-        ("DAY * (seconds[before - 1] // DAY)", "0.0", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
-        ("past_midnight(seconds) / factor", "seconds / factor", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
+        ("np.where(past, -(steps // DAY), 0.0)", "np.where(past, 1.0, 0.0)", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
+        ("days[last.size :]", "days[: arrays[name].size]", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
+        ("(steps % DAY <= self.window)", "(steps % DAY <= 0.1)", "campaign/test_live_chain.py::test_seconds_of_day_go_on_counting_over_each_midnight"),
     ],
     "campaign/pipeline.py": [
         ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),

@@ -100,15 +100,24 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
 
 def test_seconds_of_day_go_on_counting_over_each_midnight(campaign, rows):
     counted = rows["t"] + 2 * 86400.0 - 30.0
-    parts = np.r_[0, 500, 747:753, 800:1500:100]  # the midnight lies between two parts
-    for of_day in (np.where(rows["t"] < 20.0, counted, counted % 86400.0), counted % 86400.0):
+    single = np.r_[0, 500, 747:753, 800:1500:100]  # midnight is row 750, between two parts
+    lost = np.r_[0, 500, 740, 765, 800:1500:100]  # and here between rows that came
+    for of_day, parts, gap in (
+        (np.where(rows["t"] < 20.0, counted, counted % 86400.0), single, range(0)),
+        (counted % 86400.0, single, range(0)),
+        (counted % 86400.0, lost, range(740, 765)),
+    ):
         whole, fallen = chain_of(campaign), chain_of(campaign)
         first = counted[0] - of_day[0]
         for start, stop in pairwise(parts):
+            if start in gap:
+                continue
             part = {name: each[start:stop] for name, each in rows.items()}
             expected = whole.push({"": part | {"t": counted[start:stop] - first}})
             found = fallen.push({"": part | {"t": of_day[start:stop]}})
             xr.testing.assert_identical(found, expected)
+        with request_error("do not increase.*Send each row once"):
+            fallen.push({"": part | {"t": counted[start:stop] - first}})
 
 
 def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):

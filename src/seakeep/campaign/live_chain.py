@@ -20,7 +20,7 @@ from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed
-from seakeep.signals.time_axis import DAY, past_midnight
+from seakeep.signals.time_axis import DAY
 
 STATE = "state of a live chain"
 """Kind of the files of :meth:`LiveChain.save`."""
@@ -182,21 +182,20 @@ class LiveChain:
                 "needed, a number per row each. Send NaN for a value that was lost."
             )
         name, factor = self._time[key]
-        known = self._rows[key][name]
-        times, before = np.concatenate([known, arrays[name]]), known.size
-        if np.any(np.diff(times) < 0):  # seconds of day: the rows before count on
-            seconds = times * factor
-            if before:
-                seconds[before:] += DAY * (seconds[before - 1] // DAY)
-            times = past_midnight(seconds) / factor
-            arrays[name] = times[before:]
-        times = times[max(before - 1, 0) :]
-        if not np.all(np.diff(times) > 0) or not np.all(np.isfinite(times)):
+        last = self._rows[key][name][-1:]
+        times = np.concatenate([last, arrays[name]]) * factor
+        steps = np.diff(times)
+        # Seconds of day count on after midnight, where no more than a window was lost there.
+        past = (steps < 0) & (steps % DAY <= self.window) & (times[1:] < DAY)
+        days = np.cumsum([0.0, *np.where(past, -(steps // DAY), 0.0)])
+        steps = np.where(past, steps % DAY, steps)
+        if not np.all(steps > 0) or not np.all(np.isfinite(times)):
             raise RequestError(
                 f"the instants of '{key}' do not increase: "
-                f"{', '.join(f'{each * factor:g}' for each in times[:4])} … s. Send each row once, "
-                "in order."
+                f"{', '.join(f'{each:g}' for each in times[:4])} … s. Send each row once, in order."
             )
+        if past.any():
+            arrays[name] = arrays[name] + DAY / factor * days[last.size :]
         return arrays
 
     def _instants(self, key: str, table: Mapping[str, FloatArray]) -> FloatArray:

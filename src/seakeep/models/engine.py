@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from operator import call
 from typing import Any, Protocol
 
@@ -139,7 +139,7 @@ class Dynamics:
     coefficients: FloatArray
     signature: Signature
 
-    @cached_property
+    @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Regressed rows of Â and B̂."""
         size = len(self.signature.state_labels) * (self.signature.state_delays + 1)
