@@ -197,6 +197,14 @@ class Options(Table):
     file, the topic of a ROS 2 bag or MCAP file"""
 
 
+def state_group(name: str) -> str:
+    """Remedy where a file holds several groups."""
+    return (
+        f"State which one with group = '{name}' in [files] or [instruments.NAME], or give --group "
+        f"{name} to seakeep init."
+    )
+
+
 @dataclass(frozen=True)
 class Reader:
     """A kind of file and the function that reads it.

@@ -8,7 +8,7 @@ from typing import Any
 import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
-from seakeep.formats.columns import Columns, Options, decoding
+from seakeep.formats.columns import Columns, Options, decoding, state_group
 
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
@@ -104,8 +104,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
         return wanted
     if len(holding) > 1:
         raise DataError(
-            f"{path} holds no channels outside its groups: {listed}. State which one with group = "
-            "'NAME' in [files], or give --group NAME to seakeep init."
+            f"{path} holds no channels outside its groups: {listed}. {state_group('NAME')}"
         )
     return next(iter(holding))
 
