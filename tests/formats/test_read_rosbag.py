@@ -111,7 +111,7 @@ def test_topics(tmp_path):
     path = save(tmp_path, mru=imu, load=number, note=text)
     with request_error(
         r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
-        r"messages\), '/mru' .*State which one with group = 'TOPIC' in .*--group TOPIC"
+        r"messages\), '/mru' .*State which one with group = 'NAME' in .*--group NAME"
     ):
         read_table(path)
     assert list(read_table(path, FileSettings(group="/load")).data_vars) == ["data"]

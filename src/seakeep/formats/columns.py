@@ -197,12 +197,11 @@ class Options(Table):
     file, the topic of a ROS 2 bag or MCAP file"""
 
 
-def state_group(name: str) -> str:
-    """Remedy where a file holds several groups."""
-    return (
-        f"State which one with group = '{name}' in [files] or [instruments.NAME], or give --group "
-        f"{name} to seakeep init."
-    )
+WHICH = (
+    "State which one with group = 'NAME' in [files] or [instruments.LOGGER], or give --group NAME "
+    "to seakeep init."
+)
+"""Remedy where a file holds several groups."""
 
 
 @dataclass(frozen=True)

@@ -352,8 +352,12 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
             for each, start in zip(answered, starts.tolist(), strict=True)
         ]
         flags = ", ".join(f"{each.name} {each.value}" for each in validity.Validity)
-        words = {"unit": "", "description": f"sum of {flags}", "start": 0.0}
-        outside = answered[0] | words | {"name": "model.validity"}
+        outside = answered[0] | {
+            "name": "model.validity",
+            "unit": "",
+            "description": f"sum of {flags}",
+            "start": 0.0,
+        }
         channels, groups = [*given, *measured, *answered, *coming, outside], []
     return {
         "version": version(),
