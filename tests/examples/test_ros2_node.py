@@ -240,15 +240,18 @@ def test_deviations_and_validity_are_those_of_the_live_model(node, model, run, t
     steep = run.copy()
     for name in model.inputs:
         steep[name] = 3 * run[name]
-    recorded(tmp_path / "bag", steep, range(240), {("/vessel/odometry", 60)})
+    unseen = {60, *range(225, 240)}
+    recorded(tmp_path / "bag", steep, range(240), {("/vessel/odometry", at) for at in unseen})
     node.SeakeepNode.given = {"model": str(tmp_path / "model.nc")}
     vessel = node.SeakeepNode()
     vessel.play(tmp_path / "bag")
     deviations = np.array([each.position for each in vessel.published["~/estimate_std"]])
     assert len(deviations) == len(vessel.published["~/estimate"])
-    assert set(np.flatnonzero(deviations.all(axis=1))) & set(range(model.history_samples, 240)) == {
-        60
-    }
+    later = deviations[model.history_samples :].all(axis=1)
+    at = set(np.flatnonzero(later) + model.history_samples)
+    assert at == unseen & set(range(len(deviations)))
+    covariance = vessel.follower.live.covariance
+    assert_allclose(deviations[-1], np.sqrt(np.diagonal(covariance)))
     vessel.forecast()
     live, found = vessel.follower.live, vessel.published
     expected = live.forecast(200)
