@@ -6,6 +6,8 @@ Nothing here knows ROS: `node.py` does.
 from collections import Counter
 from math import isfinite, nan
 
+import numpy as np
+
 STARTING = 4
 """Samples with all inputs that a live model starts with."""
 
@@ -65,7 +67,7 @@ class Follower:
                 self.fed = now
 
     def advance(self, now):
-        """Estimates of the instants that are over: a list of (instant, states)."""
+        """Instants that are over: a list of (instant, states, their standard deviations)."""
         self._check_clock(now)
         found, over = [], now - self.patience - self.dt / 2
         while (instant := self._next()) <= over:
@@ -77,7 +79,8 @@ class Follower:
             self.lost.update((name, "missing") for name in missing)
             self.first = self.first if self.steps else instant
             u, y = ([sample[name] for name in of] for of in (self.inputs, self.states))
-            found.append((instant, self.live.step(u, y, time=instant)))
+            states = self.live.step(u, y, time=instant)
+            found.append((instant, states, np.sqrt(np.diagonal(self.live.covariance))))
             self.steps += 1
         if not self.steps:  # no instant can need what is older
             for name, waiting in self.waiting.items():

@@ -5,12 +5,14 @@ python3 node.py --ros-args -p model:=model.nc -p run:=run.nc -p state:=live.nc
 """
 
 from collections import Counter
-from functools import partial, reduce
-from math import asin, atan2
+from functools import partial
+from math import asin, atan2, hypot, nan
 from pathlib import Path
 
+import numpy as np
 import rclpy
 import xarray as xr
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from follower import Follower
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -21,6 +23,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 import seakeep
+from seakeep.errors import DataError
 
 ANGLES = {
     "roll": lambda q: atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2)),
@@ -39,10 +42,12 @@ CHANNELS = {
     "roll": ("/vessel/odometry", "nav_msgs/msg/Odometry", "pose.pose.orientation.roll", 1.0),
     "pitch": ("/vessel/odometry", "nav_msgs/msg/Odometry", "pose.pose.orientation.pitch", 1.0),
 }
+# Inputs that are no waves: {"thrust": "known"} is forecast by the plan in ~/plan, "constant" stays.
+ROLES = {}
 
 
 class SeakeepNode(Node):
-    """Publishes `~/estimate` at every step of the model, and `~/forecast` once a second."""
+    """Publishes an estimate at every step of the model, a forecast and its validity each second."""
 
     def __init__(self):
         super().__init__("seakeep")
@@ -54,11 +59,9 @@ class SeakeepNode(Node):
         model = seakeep.load_model(self.value("model"))
         run = xr.load_dataset(self.value("run")) if self.value("run") else None
         self.file = Path(self.value("state")) if self.value("state") else None
-        live = None
-        if self.file is not None and self.file.exists():
-            live = seakeep.load_live(model, self.file)
-        start = partial(model.live, like=run)
-        self.follower = Follower(start, live, patience=self.value("patience"))
+        start = partial(model.live, like=run, roles=ROLES)
+        self.follower = Follower(start, self.saved(model), patience=self.value("patience"))
+        self.lead = model.signature.lead_samples
         self.horizon, self.reported = max(round(self.value("horizon") / model.dt), 1), Counter()
         for channel in [*model.inputs, *model.states]:
             topic, kind, field, factor = CHANNELS[channel]
@@ -68,8 +71,14 @@ class SeakeepNode(Node):
                 partial(self.receive, channel, field.split("."), factor),
                 qos_profile_sensor_data,
             )
-        self.estimates = self.create_publisher(JointState, "~/estimate", 10)
-        self.forecasts = self.create_publisher(JointTrajectory, "~/forecast", 10)
+        self.known = [name for name, role in ROLES.items() if role == "known"]
+        self.planned = {}  # of known inputs: instants and values
+        self.create_subscription(JointTrajectory, "~/plan", self.receive_plan, 10)
+        self.estimates, self.forecasts = (
+            [self.create_publisher(kind, name + of, 10) for of in ("", "_std")]
+            for kind, name in ((JointState, "~/estimate"), (JointTrajectory, "~/forecast"))
+        )
+        self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(model.dt, self.estimate)
         self.create_timer(1.0, self.forecast)
         self.create_timer(10.0, self.report)
@@ -80,31 +89,73 @@ class SeakeepNode(Node):
     def now(self):
         return 1e-9 * self.get_clock().now().nanoseconds
 
+    def saved(self, model):
+        """State to go on from, if there is one; a damaged file is put aside."""
+        try:
+            return seakeep.load_live(model, self.file) if self.file and self.file.exists() else None
+        except DataError as error:
+            aside = self.file.replace(self.file.with_suffix(".damaged"))
+            self.get_logger().warning(f"starting anew; the state is kept as {aside}: {error}")
+            return None
+
     def receive(self, channel, fields, factor, message):
-        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        self.follower.receive(channel, stamp, factor * reduce(read, fields, message), self.now())
+        stamp, value = seconds(message.header.stamp), factor * read(message, fields)
+        self.follower.receive(channel, stamp, value, self.now())
 
     def estimate(self):
-        for instant, state in self.follower.advance(self.now()):
-            message = JointState(name=self.follower.states, position=state.tolist())
-            message.header.stamp = Time(seconds=instant).to_msg()
-            self.estimates.publish(message)
+        for instant, *numbers in self.follower.advance(self.now()):
+            for publisher, values in zip(self.estimates, numbers, strict=True):
+                message = JointState(name=self.follower.states, position=values.tolist())
+                message.header.stamp = Time(seconds=instant).to_msg()
+                publisher.publish(message)
+
+    def receive_plan(self, message):
+        """Take a plan; one without a stamp begins now."""
+        start = seconds(message.header.stamp) or self.now()
+        at = [start + seconds(point.time_from_start) for point in message.points]
+        rows = np.transpose([point.positions for point in message.points])
+        self.planned = dict(zip(message.joint_names, ((at, row) for row in rows), strict=False))
 
     def forecast(self):
         live = self.follower.live
         if not live.ready:
             return
-        found = live.forecast(self.horizon).sel(statistic="mean")
+        instants = live.time + self.follower.dt * np.arange(1, self.horizon + self.lead)
+        plan = {
+            name: np.interp(instants, *self.planned[name])  # its last value holds on
+            for name in self.known
+            if name in self.planned
+        }
+        if len(plan) < len(self.known):
+            self.diagnose(f"no forecast: ~/plan must give {', '.join(self.known)}")
+        else:
+            found = live.forecast(self.horizon, plan)
+            self.diagnose(found.attrs["validity"])
+            for publisher, statistic in zip(self.forecasts, ("mean", "std"), strict=True):
+                publisher.publish(self.trajectory(found.sel(statistic=statistic)))
+        if self.file is not None:
+            live.save(self.file)
+
+    def trajectory(self, found):
+        """One statistic of a forecast as a message."""
         names = self.follower.states
         message = JointTrajectory(joint_names=names)
-        message.header.stamp = Time(seconds=live.time).to_msg()
+        message.header.stamp = Time(seconds=self.follower.live.time).to_msg()
         for number, row in enumerate(found[names].to_array().values.T, 1):
             after = Duration(seconds=number * self.follower.dt).to_msg()
             point = JointTrajectoryPoint(positions=row.tolist(), time_from_start=after)
             message.points.append(point)
-        self.forecasts.publish(message)
-        if self.file is not None:
-            live.save(self.file)
+        return message
+
+    def diagnose(self, words):
+        """Publish whether forecasts hold, and the consistency of each state in free runs."""
+        level = DiagnosticStatus.OK if words == "inside" else DiagnosticStatus.WARN
+        rows = zip(self.follower.states, self.follower.live.consistency_by_state[1], strict=True)
+        values = [KeyValue(key=f"consistency of {name}", value=f"{row:.3g}") for name, row in rows]
+        status = DiagnosticStatus(level=level, name="seakeep", message=words, values=values)
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = Time(seconds=self.follower.live.time).to_msg()
+        self.diagnostics.publish(message)
 
     def report(self):
         lost = self.follower.lost - self.reported
@@ -114,9 +165,24 @@ class SeakeepNode(Node):
             self.get_logger().warning(f"lost in the last 10 s: {', '.join(words)}")
 
 
-def read(message, field):
-    """Value of a field of a message, or an angle of a quaternion."""
-    return ANGLES[field](message) if field in ANGLES else getattr(message, field)
+def seconds(stamp):
+    """Time or duration of a message in seconds."""
+    return stamp.sec + 1e-9 * stamp.nanosec
+
+
+def read(message, fields):
+    """Number in a message, NaN where it says that there is none.
+
+    It says so by a covariance that starts with -1, or a quaternion that is not of length 1.
+    """
+    for field in fields:
+        if getattr(message, f"{field}_covariance", [0.0])[0] == -1:
+            return nan
+        if field in ANGLES:
+            size = hypot(message.w, message.x, message.y, message.z)
+            return ANGLES[field](message) if abs(size - 1) < 0.01 else nan
+        message = getattr(message, field)
+    return message
 
 
 def main():

@@ -57,13 +57,13 @@ def play(follower, sent):
 
 
 def states(found):
-    return np.array([state for _, state in found])
+    return np.array([state for _, state, _ in found])
 
 
 def test_complete_samples_are_the_steps_of_the_live_model(model, run):
     expected, follower = model.live(), Follower(model.live)
     found = play(follower, messages(model, run, jitter=0.2))
-    for sample, (instant, state) in enumerate(found):
+    for sample, (instant, state, _) in enumerate(found):
         u, y = ([run[name].values[sample] for name in of] for of in (model.inputs, model.states))
         assert_array_equal(state, expected.step(u, y))
         assert instant == pytest.approx(CLOCK + sample * DT, abs=0.1 * DT)
@@ -81,7 +81,7 @@ def test_any_order_of_arrival_within_patience_gives_the_same_estimates(model, ru
         late = [(each[2] + delay, *each[1:]) for each, delay in zip(sent, delays, strict=True)]
         both = [Follower(model.live, patience=PATIENCE) for _ in range(2)]
         found = [play(each, stream) for each, stream in zip(both, (sent, late), strict=True)]
-        assert [instant for instant, _ in found[0]] == [instant for instant, _ in found[1]]
+        assert [each[0] for each in found[0]] == [each[0] for each in found[1]]
         assert_array_equal(states(found[0]), states(found[1]))
         assert both[0].lost == both[1].lost
 
@@ -207,7 +207,108 @@ def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
 
 @pytest.mark.parametrize("turn", [(0.4, -0.2, 0.7), (0.0, np.pi / 2, 0.0), (-3.0, 0.1, 3.1)])
 def test_angles_of_a_quaternion(node, turn):
-    angles = [node.read(quaternion(turn), name) for name in ("yaw", "pitch", "roll")]
+    angles = [node.read(quaternion(turn), [name]) for name in ("yaw", "pitch", "roll")]
     # asin is steep where the bow points upwards.
     found, turned = Rotation.from_euler("ZYX", [angles, turn]).as_quat()
     assert_allclose(found, turned, atol=1e-7)
+
+
+ODD = {
+    "NaN": {"w": np.nan},
+    "zero": {"w": 0.0},
+    "too long": {"w": 1.02},
+    "absent by its covariance": {"w": 1.0},
+}
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_an_orientation_or_a_rate_that_is_not_there_is_missing(node, odd):
+    from bags import message
+
+    turn = message("geometry_msgs/msg/Quaternion")(**ODD[odd])
+    absent = [-1.0] + [0.0] * 8 if "covariance" in odd else [0.0] * 9
+    imu = message("sensor_msgs/msg/Imu")(
+        orientation=turn, orientation_covariance=absent, angular_velocity_covariance=absent
+    )
+    assert all(np.isnan(node.read(imu, ["orientation", angle])) for angle in node.ANGLES)
+    assert np.isnan(node.read(imu, ["angular_velocity", "x"])) == ("covariance" in odd)
+    assert node.read(imu, ["linear_acceleration", "z"]) == 0.0
+
+
+def test_deviations_and_validity_are_those_of_the_live_model(node, model, run, tmp_path):
+    model.save(tmp_path / "model.nc")
+    steep = run.copy()
+    for name in model.inputs:
+        steep[name] = 3 * run[name]
+    unseen = {60, *range(225, 240)}
+    recorded(tmp_path / "bag", steep, range(240), {("/vessel/odometry", at) for at in unseen})
+    node.SeakeepNode.given = {"model": str(tmp_path / "model.nc")}
+    vessel = node.SeakeepNode()
+    vessel.play(tmp_path / "bag")
+    deviations = np.array([each.position for each in vessel.published["~/estimate_std"]])
+    assert len(deviations) == len(vessel.published["~/estimate"])
+    later = deviations[model.history_samples :].all(axis=1)
+    at = set(np.flatnonzero(later) + model.history_samples)
+    assert at == unseen & set(range(len(deviations)))
+    covariance = vessel.follower.live.covariance
+    assert_allclose(deviations[-1], np.sqrt(np.diagonal(covariance)))
+    vessel.forecast()
+    live, found = vessel.follower.live, vessel.published
+    expected = live.forecast(200)
+    for topic, statistic in (("~/forecast", "mean"), ("~/forecast_std", "std")):
+        rows = [each.positions for each in found[topic][-1].points]
+        wanted = expected[model.states].sel(statistic=statistic).to_array().values.T
+        assert_allclose(rows, wanted)
+    (status,) = found["/diagnostics"][-1].status
+    assert (status.level, status.message) == (1, expected.attrs["validity"])
+    assert "height" in status.message
+    free = live.consistency_by_state[1]
+    assert [float(each.value) for each in status.values] == pytest.approx(free, rel=0.01)
+
+
+def test_a_known_input_is_forecast_by_its_plan(node, model, run, tmp_path, monkeypatch):
+    from bags import message
+    from stand_in_ros import TIME
+
+    model.save(tmp_path / "model.nc")
+    recorded(tmp_path / "bag", run, range(120), ())
+    monkeypatch.setitem(node.ROLES, "eta_cog", "known")
+    node.SeakeepNode.given = {"model": str(tmp_path / "model.nc"), "horizon": 1.0}
+    vessel = node.SeakeepNode()
+    vessel.play(tmp_path / "bag")
+    (status,) = vessel.published["/diagnostics"][-1].status
+    assert (status.level, status.message) == (1, "no forecast: ~/plan must give eta_cog")
+    assert "~/forecast" not in vessel.published
+
+    live = vessel.follower.live
+    head = message("std_msgs/msg/Header")(stamp=TIME(live.time).to_msg())
+    point, after = message("trajectory_msgs/msg/JointTrajectoryPoint"), [0.0, 0.5]
+    points = [
+        point(positions=[0.2 * at], time_from_start=TIME(at).to_msg()) for at in after
+    ]  # a Duration has the fields of a Time
+    vessel.receive_plan(
+        message("trajectory_msgs/msg/JointTrajectory")(
+            header=head, joint_names=["eta_cog"], points=points
+        )
+    )
+    vessel.forecast()
+    leads = DT * np.arange(1, 20 + model.lead_samples)
+    expected = live.forecast(20, {"eta_cog": 0.2 * np.minimum(leads, 0.5)})
+    rows = [each.positions for each in vessel.published["~/forecast"][-1].points]
+    wanted = expected[model.states].sel(statistic="mean").to_array().values.T
+    assert_allclose(rows, wanted, atol=1e-6)  # stamps count ns, and a float of 1.7e9 s has 0.2 µs
+
+
+def test_a_damaged_state_is_put_aside(node, model, run, tmp_path):
+    model.save(tmp_path / "model.nc")
+    recorded(tmp_path / "bag", run, range(120), ())
+    live, state = model.live(), tmp_path / "state.nc"
+    live.save(state)
+    damaged = state.read_bytes()[: state.stat().st_size // 2]
+    state.write_bytes(damaged)
+    node.SeakeepNode.given = {"model": str(tmp_path / "model.nc"), "state": str(state)}
+    vessel = node.SeakeepNode()
+    assert state.with_suffix(".damaged").read_bytes() == damaged
+    assert "starting anew" in vessel.warnings[0]
+    vessel.play(tmp_path / "bag")
+    assert node.SeakeepNode().follower.live.time == pytest.approx(CLOCK + 119 * DT, abs=1.5)

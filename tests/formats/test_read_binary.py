@@ -153,7 +153,8 @@ def test_hdf5_groups(tmp_path):
             place["heave"].attrs["units"] = "mm"
     with data_error(
         r"no channels outside its groups: 'basin/run1' \(3 sets\), 'basin/run2' \(3 sets\)\. "
-        r"State which one with group = 'NAME' in \[files\], or give --group NAME to seakeep init"
+        r"State which one with group = 'NAME' in \[files\] or \[instruments\.LOGGER\], or give "
+        r"--group NAME to seakeep init"
     ):
         read_table(path)
     check(read_table(path, FileSettings(group="basin/run2")))

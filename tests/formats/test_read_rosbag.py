@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 
+from seakeep import read_campaign
 from seakeep.campaign import read_table
 from seakeep.campaign.readers import checksum
 from seakeep.campaign.settings import FileSettings
@@ -12,8 +13,10 @@ from seakeep.campaign.settings import FileSettings
 pytest.importorskip("rosbags")
 
 from bags import STORE, message, write_bag
+from pages import page
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_types_from_msg
+from scipy.spatial.transform import Rotation
 
 STORE.register(
     get_types_from_msg(
@@ -108,7 +111,7 @@ def test_topics(tmp_path):
     path = save(tmp_path, mru=imu, load=number, note=text)
     with request_error(
         r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
-        r"messages\), '/mru' .*State which one with group = 'TOPIC'"
+        r"messages\), '/mru' .*State which one with group = 'NAME' in .*--group NAME"
     ):
         read_table(path)
     assert list(read_table(path, FileSettings(group="/load")).data_vars) == ["data"]
@@ -135,3 +138,39 @@ def test_the_checksum_of_a_bag_follows_its_files(tmp_path):
     file = next(path.glob("*.mcap"))
     file.write_bytes(file.read_bytes() + b"x")
     assert checksum(path) != before
+
+
+def test_topics_of_one_bag_are_loggers_as_the_page_says(tmp_path):
+    """A probe at 20 Hz, stamped 3 ms after the samples of an IMU at 50 Hz, whose angles turn."""
+    point, turn = (message(f"geometry_msgs/msg/{kind}") for kind in ("Point", "Quaternion"))
+    vector, stamped = (
+        message("geometry_msgs/msg/Vector3"),
+        message("geometry_msgs/msg/PointStamped"),
+    )
+    imu_times, probe_times = np.arange(0, 60, 0.02), np.arange(0.003, 60, 0.05)
+    sent = []
+    for t in imu_times:
+        instant, pitch, yaw = BEGIN + round(1e9 * t), 0.1 * np.sin(2 * t), 0.7
+        x, y, z, w = Rotation.from_euler("ZYX", [yaw, pitch, 0.02]).as_quat().tolist()
+        made = message("sensor_msgs/msg/Imu")(
+            header=header(instant),
+            orientation=turn(x=x, y=y, z=z, w=w),
+            angular_velocity=vector(y=0.2 * np.cos(2 * t)),
+        )
+        sent.append((instant, "/imu/data", made))
+    for t in probe_times:
+        instant = BEGIN + round(1e9 * t)
+        made = stamped(header=header(instant), point=point(z=0.3 * np.sin(2 * t + 1)))
+        sent.append((instant, "/radar/fwd", made))
+    write_bag(tmp_path / "bag_one", sorted(sent, key=lambda each: each[0]))
+    shown = page("howto/data.md").partition("```toml\n")[2].partition("```")[0]
+    head = '[campaign]\nname = "Bag"\nencounter_period = 3.14\n\n[preparation]\ndt = 0.05\n\n'
+    (tmp_path / "campaign.toml").write_text(head + shown, "utf-8")
+    run = read_campaign(tmp_path / "campaign.toml").prepare()["one"]
+    inside = run.isel(time=slice(20, -20))  # filters reach over the ends
+    t = inside["time"].values
+    # Between samples it is interpolated; the stamps of the probe are its own.
+    assert_allclose(inside["eta_fwd"], 0.3 * np.sin(2 * t + 1), atol=1e-3)
+    assert_allclose(inside["pitch_rate"], 0.2 * np.cos(2 * t), atol=1e-3)
+    sine = np.sin(0.1 * np.sin(2 * t))
+    assert_allclose(inside["pitch"], sine, atol=1e-4)

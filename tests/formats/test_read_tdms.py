@@ -81,7 +81,7 @@ def test_groups(read):
     both = channel("heave", HEAVE, **WAVEFORM), loads
     with request_error(
         r"several groups that are sampled differently: 'loads' \(1 channels of 2000\), 'run' "
-        r"\(1 channels of 200\)\. State which one with group = 'NAME'"
+        r"\(1 channels of 200\)\. State which one with group = 'NAME' in .*--group NAME to"
     ):
         read(*both)
     assert read(*both, group="loads").sizes["time"] == 2000

@@ -77,9 +77,23 @@ class Node:
         self.clock = until
 
 
+def status(*, level, **given):
+    """Message of a status; rclpy has its level, a byte, as bytes."""
+    return message("diagnostic_msgs/msg/DiagnosticStatus")(level=ord(level), **given)
+
+
+status.OK, status.WARN = b"\0", b"\1"
+
+
 def install(monkeypatch):
     """Put the stand-in where `import rclpy` looks."""
     modules = {
+        "diagnostic_msgs": {},
+        "diagnostic_msgs.msg": {
+            "DiagnosticArray": message("diagnostic_msgs/msg/DiagnosticArray"),
+            "DiagnosticStatus": status,
+            "KeyValue": message("diagnostic_msgs/msg/KeyValue"),
+        },
         "rclpy": {},
         "rclpy.duration": {"Duration": instant("builtin_interfaces/msg/Duration")},
         "rclpy.node": {"Node": Node},

@@ -1,6 +1,8 @@
 """The C of a model computes what Python does, in one program with the C of other models."""
 
 import ctypes
+import shutil
+import subprocess
 from dataclasses import replace
 
 import compiled
@@ -10,7 +12,7 @@ from compiled import pointer
 from numpy.testing import assert_allclose, assert_array_equal
 
 from seakeep import HankelDMDc, ProbeAlignment
-from seakeep.hosts import write_c
+from seakeep.hosts import write_c, write_estimator
 from seakeep.hosts.c import identifier
 
 NAMES = ["full", "short", "arx", "autonomous", "unstable", "following", "following_now"]
@@ -127,3 +129,14 @@ def test_an_alignment_that_was_left_out_leaves_nothing_to_be_carried(tmp_path, m
         for number, each in enumerate((optional, None))  # the runs state no depth
     )
     assert [path.read_text() for path in made] == [path.read_text() for path in plain]
+
+
+def test_a_header_is_cxx11_and_its_step_is_exact(cases, tmp_path):
+    if shutil.which("c++") is None:
+        pytest.skip("there is no C++ compiler")
+    model = cases["full"].model
+    write_estimator(model, tmp_path)
+    same = f'#include "rom_estimator.h"\nstatic_assert(ROM_STEP == {model.dt!r}, "the step");\n'
+    (tmp_path / "host.cpp").write_text(same)
+    flags = ["-std=c++11", "-pedantic", "-Wall", "-Werror", "-fsyntax-only"]
+    subprocess.run(["c++", *flags, "host.cpp"], cwd=tmp_path, check=True)

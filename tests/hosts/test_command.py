@@ -6,6 +6,7 @@ import pytest
 from drifting import INPUTS, STATES, drifting_run
 from ensembles import few
 from said import request_error
+from scipy.io import loadmat
 
 from seakeep import HankelDMDc, ProbeAlignment
 from seakeep.hosts import write_estimator
@@ -35,9 +36,13 @@ def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, cases
     assert lead in said
 
 
-def test_a_reduced_order_is_of_the_matrices_alone_and_states_its_error(make_run, run):
+def test_a_reduced_order_is_of_the_matrices_alone_and_states_its_error(make_run, run, tmp_path):
     model, words = heave_model(make_run, stable=True), "--mat m.mat --order 4"
-    assert "The system of order 4 errs by" in run(model, words)
+    content = loadmat(model.to_mat(tmp_path / "same.mat", 4))
+    peak, bound = (content[f"Error{each}"].item() for each in ("Peak", "Bound"))
+    said = run(model, words)
+    assert f"The system of order 4 errs by {peak:.3g} SD of its outputs" in said
+    assert f"and by {bound:.3g} at most at any." in said
     said = run(model, f"{words} --c . --estimator", 2)
     assert "--order reduces the linear system of --mat; an estimator" in said
 

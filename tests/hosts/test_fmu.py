@@ -12,6 +12,7 @@ from said import request_error
 from seakeep import HankelDMDc
 from seakeep.hosts import write_fmu
 from seakeep.hosts.c import compiler
+from seakeep.models.validity import Validity
 
 fmpy = pytest.importorskip("fmpy")
 if compiler() is None:
@@ -174,10 +175,13 @@ def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samp
         str(unit),
         stop_time=count * dt,
         input=np.array(rows, dtype=[(name, float) for name in names]),
-        output=[*model.states, *coming],
+        output=[*model.states, *coming, "model.validity"],
     )
     live = model.live()
     expected = [live.step(*row) for row in zip(u, y, strict=True)]
     assert_allclose(result[model.states].tolist()[1:], expected, rtol=1e-10, atol=1e-10)
     expected = table(live.forecast(3), model.states)[:2].ravel()
     assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)
+    flags = result["model.validity"].astype(int)
+    assert flags[-1] | Validity.CONSISTENCY == live.validity | Validity.CONSISTENCY
+    assert flags[0] == Validity(0) != live.validity & Validity.LOST

@@ -79,6 +79,9 @@ def test_the_error_of_a_truncated_system_stays_below_its_bound(make_run, tmp_pat
     bound = small["ErrorBound"].item()
     # At least the first singular value that is left out, at most twice the sum of all.
     assert 0.05 * bound < max(errors) <= bound
+    np.testing.assert_allclose(
+        small["ErrorPeak"].item(), max(errors), rtol=1e-9
+    )  # the same frequencies
     with request_error("order is 99; it must lie between 1 and"):
         model.to_mat(tmp_path / "more.mat", 99)
 

@@ -563,6 +563,15 @@ def test_a_bad_sample_leaves_the_state_as_it_was(model, drift, message, waves, m
     assert live.consistency == untouched.consistency
 
 
+def test_times_since_1970_are_told_apart(model, waves, motions):
+    live = model.live()
+    live.step(waves[0], motions[0], time=1780000000.5)
+    with request_error(r"time = 1780000000\.45 s is not after the last sample at 1780000000\.5 s"):
+        live.step(waves[1], motions[1], time=1780000000.45)
+    with request_error(r"time = 1780000000\.75 s is 0\.25 s after"):
+        live.step(waves[1], motions[1], time=1780000000.75)
+
+
 def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     """Surge that answers a wave and a thruster: x' = .9 x + .3 u + .5 thrust, exactly."""
 

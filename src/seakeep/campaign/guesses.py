@@ -434,7 +434,8 @@ def _channels(column: str, dimension: str | None, logger: str) -> Iterator[str]:
     numbers = [word for word in words if word.isdigit()]
     if "range" not in kinds:
         if "wave" in kinds:
-            yield "eta_" + ("_".join([w for w in words if w in CALLED["place"]] + numbers) or "1")
+            places = [word for word in words if word in CALLED["place"]]
+            yield "eta_" + ("_".join(words[1:] if words[0] == "eta" else places + numbers) or "1")
         if dimension == "m" and "wave" in kinds_of(logger):
             yield "eta_" + "_".join(words)
     yield from motions_of(column)

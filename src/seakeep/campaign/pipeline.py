@@ -208,7 +208,7 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path]) -> Ru
     for key, path in paths.items():
         options = settings.files
         if key:
-            own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate"}
+            own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate", "group"}
             options = options.model_copy(update=own.model_dump(include=keys, exclude_none=True))
         columns = read_columns(path, options)
         # Times go before a rate, unless they cannot be read and it is this logger's own.

@@ -166,6 +166,8 @@ class InstrumentSettings(TimesSettings):
     `drift` as stated, or the reference's own clock.
     """
 
+    group: str | None = None
+    """the part of its file that is read, as in [files]; several loggers may share a file"""
     trigger: str | None = None
     """the column that holds the trigger"""
     trigger_unit: str | None = None

@@ -197,6 +197,13 @@ class Options(Table):
     file, the topic of a ROS 2 bag or MCAP file"""
 
 
+WHICH = (
+    "State which one with group = 'NAME' in [files] or [instruments.LOGGER], or give --group NAME "
+    "to seakeep init."
+)
+"""Remedy where a file holds several groups."""
+
+
 @dataclass(frozen=True)
 class Reader:
     """A kind of file and the function that reads it.

@@ -8,7 +8,7 @@ from typing import Any
 import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
-from seakeep.formats.columns import Columns, Options, decoding
+from seakeep.formats.columns import WHICH, Columns, Options, decoding
 
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
@@ -103,10 +103,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
     if wanted is not None or "" in holding or not holding:
         return wanted
     if len(holding) > 1:
-        raise DataError(
-            f"{path} holds no channels outside its groups: {listed}. State which one with group = "
-            "'NAME' in [files], or give --group NAME to seakeep init."
-        )
+        raise DataError(f"{path} holds no channels outside its groups: {listed}. {WHICH}")
     return next(iter(holding))
 
 

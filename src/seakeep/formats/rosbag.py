@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from seakeep.errors import DataError, RequestError, did_you_mean, needing, warn
-from seakeep.formats.columns import UNITS, Columns, Options, decoding
+from seakeep.formats.columns import UNITS, WHICH, Columns, Options, decoding
 
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 LARGEST_ARRAY = 64
@@ -111,8 +111,7 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     if len(types) > 1:
         listed = ", ".join(f"'{topic}' ({what} messages)" for topic, what in sorted(types.items()))
         raise RequestError(
-            f"{path} holds several topics, each with times of its own: {listed}. State which one "
-            "with group = 'TOPIC' in [files]."
+            f"{path} holds several topics, each with times of its own: {listed}. {WHICH}"
         )
     return next(iter(types))
 

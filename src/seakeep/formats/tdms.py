@@ -14,7 +14,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, needing
-from seakeep.formats.columns import Columns, Options, decoding
+from seakeep.formats.columns import WHICH, Columns, Options, decoding
 
 LEAD_IN = 28
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
@@ -119,8 +119,7 @@ def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
             for name, channels in filled.items()
         )
         raise RequestError(
-            f"{path} holds several groups that are sampled differently: {listed}. State which one "
-            "with group = 'NAME' in [files]."
+            f"{path} holds several groups that are sampled differently: {listed}. {WHICH}"
         )
     return [channel for channels in filled.values() for channel in channels]
 

@@ -63,8 +63,8 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
 
     Notes
     -----
-    Numbers are written in hexadecimal, so that none is rounded. ``cc -std=c99 -Wall -Werror``
-    compiles the code without a warning.
+    Numbers are written in hexadecimal, so that none is rounded, but in headers, which C++11 reads
+    too. ``cc -std=c99 -Wall -Werror`` compiles the code without a warning.
     """
     return _written(_sources(exportable(model), identifier(name)), folder)
 
@@ -236,7 +236,8 @@ def write_fmu(
         Instants that an estimator forecasts. With it the unit follows a vessel, as
         :func:`seakeep.hosts.write_estimator` says: inputs ``measured.NAME`` are the states, NaN
         where they were not measured, and outputs their estimates, ``ahead.NAME[1]`` …, and the
-        standard deviations ``std.NAME[1]`` …
+        standard deviations ``std.NAME[1]`` …, and ``model.validity``. Forecasts hold a known input
+        at its last value.
     noise, roles : mapping, optional
         Of an estimator, as for ``model.live``.
 
@@ -350,7 +351,14 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
             for step in range(1, ahead + 1)
             for each, start in zip(answered, starts.tolist(), strict=True)
         ]
-        channels, groups = [*given, *measured, *answered, *coming], []
+        flags = ", ".join(f"{each.name} {each.value}" for each in validity.Validity)
+        outside = answered[0] | {
+            "name": "model.validity",
+            "unit": "",
+            "description": f"sum of {flags}",
+            "start": 0.0,
+        }
+        channels, groups = [*given, *measured, *answered, *coming, outside], []
     return {
         "version": version(),
         "timing": timing(model, ahead is not None),

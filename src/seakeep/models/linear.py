@@ -458,9 +458,10 @@ class HankelDMDcModel(Model):
         path : str or Path
             File to write; its suffix should be ``.mat``. It replaces no file but another system.
         order : int, optional
-            Order to which balanced truncation brings the system. Its entry ``ErrorBound`` is the
-            largest gain that the error can have at any frequency, SDs of outputs per SD of inputs;
-            its state is no longer that of :meth:`initial_state`, and starts from zero.
+            Order to which balanced truncation brings the system. Its entry ``ErrorPeak`` is the
+            largest gain of the error, SDs of outputs per SD of inputs, at 400 frequencies,
+            ``ErrorBound`` the largest that it can have at any; its state is no longer that of
+            :meth:`initial_state`, and starts from zero.
 
         Returns
         -------

@@ -499,12 +499,12 @@ class Live:
             return instant
         if instant <= self._time:
             raise RequestError(
-                f"time = {instant:g} s is not after the last sample at {self._time:g} s. Samples "
-                "must come in the order of their instants, each once."
+                f"time = {instant:.15g} s is not after the last sample at {self._time:.15g} s. "
+                "Samples must come in the order of their instants, each once."
             )
         raise RequestError(
-            f"time = {instant:g} s is {instant - self._time:g} s after the last sample, and the "
-            f"model steps by {dt:g} s, to a hundredth. Call step() without arguments once for "
+            f"time = {instant:.15g} s is {instant - self._time:g} s after the last sample, and "
+            f"the model steps by {dt:g} s, to a hundredth. Call step() without arguments once for "
             "each sample that was lost; resample the rest to the model's step, as "
             "campaign.live_chain does."
         )

@@ -41,7 +41,8 @@ enum {
     Q = {{ upper }}_INPUTS,
 {% if ahead %}
     OUTPUTS = Q + N, /* values are inputs and what was measured, estimates, forecasts, and their errors */
-    X_HISTORY = OUTPUTS + N * {{ 1 + 2 * ahead }},
+    VALIDITY = OUTPUTS + N * {{ 1 + 2 * ahead }},
+    X_HISTORY, /* there are no histories */
     U_HISTORY = X_HISTORY,
     COUNT = U_HISTORY
 {% else %}
@@ -166,6 +167,10 @@ EXPORT Status FMI(fmi2GetReal)(void *c, const Reference at[], size_t count, doub
         if (at[i] >= COUNT)
             return report(instance, ERROR, "there is no variable with this value reference");
         values[i] = instance->state.values[at[i]];
+{% if ahead %}
+        if (at[i] == VALIDITY) /* found when asked for: it takes long */
+            values[i] = {{ name }}_validity(&instance->state.model);
+{% endif %}
     }
     return OK;
 }

@@ -28,7 +28,7 @@ extern "C" {
 #define {{ upper }}_LEAD {{ lead_samples }}
 #define {{ upper }}_X_ROWS {{ x_rows }} /* of x_history: instants k - {{ x_rows - 1 }} to k */
 #define {{ upper }}_U_ROWS {{ u_rows }} /* of u_history: instants k - {{ u_rows - lead_samples }} to k - 1 + {{ upper }}_LEAD */
-#define {{ upper }}_STEP {{ dt | hex }} /* s */
+#define {{ upper }}_STEP {{ dt }} /* s */
 
 #define {{ upper }}_WINDOW {{ window }} /* rows of inputs that a step reads */
 #define {{ upper }}_NOW {{ now }} /* of these, that of the instant which it starts from */
