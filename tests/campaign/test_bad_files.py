@@ -144,8 +144,10 @@ def test_a_stated_unit_against_a_header(tank, changed):
     for header in ("m", "deg"):
         with request_error(
             rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
-            rf"says '{header}' for the column 'Heave'\. Leave unit out where the files say it; "
-            r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]"
+            rf"says '{header}' for the column 'Heave'\. Leave unit out if all files say one; if "
+            rf"some say none, state '{header}', and in \[runs\.RUN\.channels\.heave\] the unit of "
+            "each that has another; or, if this file is wrong, state its unit in "
+            r"\[runs\.second\.channels\.heave\]"
         ):
             prepared(header)
     mended = "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"

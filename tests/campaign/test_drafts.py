@@ -259,6 +259,25 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted):
     assert 'role = "train" # the only run to train on\n' in text
 
 
+def test_one_file_of_full_scale_is_named_and_spoils_no_other(tmp_path, drafted):
+    """What a decay radiates is less steep than the waves, so they are not the odd ones."""
+    files = [write_csv(tmp_path / f"a{i}.csv", tank_columns(i, 60.0)) for i in range(3)]
+    full = {name: (7 if "Time" in name else 49) * x for name, x in tank_columns(1, 60.0).items()}
+    text, campaign = drafted([*files, write_csv(tmp_path / "full.csv", full)])
+    roles = {name: run.role for name, run in campaign.settings.runs.items()}
+    assert roles == {"a0": "train", "a1": "train", "a2": "test", "full": "unused"}
+    assert campaign.settings.runs["a0"].waves == "irregular"
+    assert 'role = "unused" # guessed: its waves are 49 times those of the others (median)' in text
+    quiet = [
+        write_csv(tmp_path / f"decay{i}.csv", {
+            name: (1 if "Time" in name else 0.02) * x for name, x in tank_columns(i, 60.0).items()
+        })
+        for i in range(3)
+    ]  # fmt: skip
+    _, campaign = drafted([files[0], *quiet])
+    assert [run.role for run in campaign.settings.runs.values()] == ["train", *3 * ["unused"]]
+
+
 @pytest.mark.parametrize(
     ("dead", "beside"),
     [("constant", True), ("noise", True), ("hum", True), ("constant", False), ("noise", False)],
@@ -298,6 +317,23 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path,
     assert text.count("# guessed: the same waves come again\n") == 4
     text, _ = drafted([files[0], files[4]])
     assert "# guessed: no waves lie within those of the others; the nearest run tests" in text
+
+
+def test_a_unit_that_some_files_state_is_that_of_all(tmp_path, drafted):
+    """Where they disagree, each keeps its own."""
+    columns = tank_columns(0, 60.0)
+    bare = {"Heave" if name == "Heave [mm]" else name: x for name, x in columns.items()}
+    silent = write_csv(tmp_path / "silent.csv", bare)
+    said = [write_csv(tmp_path / f"said{i}.csv", tank_columns(i, 60.0)) for i in range(2)]
+    text, campaign = drafted([silent, *said])
+    assert 'unit = "mm" # guessed: some files say it, the others state none.' in text
+    assert text.count("\nunit = ") == 1
+    runs = campaign.prepare()
+    np.testing.assert_array_equal(runs["silent"]["heave"], runs["said0"]["heave"])
+    del bare["Heave"]
+    other = write_csv(tmp_path / "other.csv", {**bare, "Heave [cm]": columns["Heave [mm]"] / 10})
+    text, _ = drafted([silent, *said, other])
+    assert "\nunit = " not in text
 
 
 def test_init_keeps_how_files_are_read(tmp_path, command):

@@ -63,6 +63,18 @@ def test_a_wrong_position_is_warned_of_once_and_is_a_finding_of_every_run(campai
         ]
 
 
+def test_where_no_position_fits_the_waves_depth_and_sign_are_to_be_checked(campaign, tmp_path):
+    path = tmp_path / "campaign.toml"
+    settings = campaign(48.42)
+    path.write_text(path.read_text("utf-8").replace('"cog"', '"cog"\nsign = -1'), "utf-8")
+    with warned(
+        r"one: eta_cog is stated to stand [+-]\d\.\d+ m from eta_\w+, and at no distance do the "
+        r"phases .* at best\)\. Check the water depth, \[rig\.positions\], and signs and clocks"
+    ):
+        seakeep.read_campaign(path).prepare(["one"])
+    assert not findings_of(settings.prepare(["one"])["one"])
+
+
 def test_still_water_and_noise_place_no_probes(campaign, tmp_path):
     path, rng = tmp_path / "two.csv", np.random.default_rng(0)
     time = np.arange(0, 90, 0.05)

@@ -167,6 +167,14 @@ def test_hdf5_groups(tmp_path):
     check(read_table(path))  # the only one
 
 
+def test_hdf5_vectors_of_one_row_and_either_word_for_units(tmp_path):
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        for name, values in {"time": T, "heave": HEAVE, "wave": WAVE}.items():
+            file[name] = values[None, :]
+        file["heave"].attrs["unit"] = "mm"
+    check(read_table(tmp_path / "run.h5"))
+
+
 def test_hdf5_sets_of_several_columns_are_split(tmp_path):
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["time"], file["acc"] = T, np.column_stack([HEAVE, WAVE, T])

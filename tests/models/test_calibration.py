@@ -171,6 +171,20 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
     assert_array_equal(one.conformal.margin, two.conformal.margin)
 
 
+def test_a_run_that_repeats_the_judged_one_does_not_train():
+    """As in fit and study; where every run repeats it, the others are what there is."""
+    runs = {"a": sea(0, 500, "a"), "b": sea(1, 500, "b"), "c": sea(1, 500, "c")}
+    noise = 0.01 * np.random.default_rng(0).normal(size=500)
+    runs["c"] = runs["c"].assign(heave=runs["c"]["heave"] + noise)
+    alone = pooled("all", {"a": runs["a"]})
+    found = pooled("all", runs).calibrate({"b": runs["b"]}, 40, folds="run").calibration
+    assert_learnt(found, [held_out({"b": (alone, runs["b"])}, 40, 0.95)["b"]])
+    twice = {name: runs[name] for name in "bc"}
+    found = pooled("all", twice).calibrate({"b": runs["b"]}, 40, folds="run").calibration
+    repeat = pooled("all", {"c": runs["c"]})
+    assert_learnt(found, [held_out({"b": (repeat, runs["b"])}, 40, 0.95)["b"]])
+
+
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b"))}
     ensemble = pooled("runs", runs)

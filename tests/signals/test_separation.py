@@ -64,6 +64,18 @@ def test_right_positions_pass_and_one_wrong_by_the_paper_s_is_named(seed, condit
     assert not either.certain
 
 
+def test_waves_that_fit_no_distance_are_told_where_both_probes_recorded_them():
+    """A wrong depth or sign; a sea in noise correlates as little, and is not doubted."""
+    records = records_of(0, {"a": 0.0, "b": 3.67})
+    for b, depth in ((records["b"], 0.4), (-records["b"], DEPTH)):
+        found = probe_separation(records["a"], b, DT, depth, 3.67)
+        assert (found.known, found.disagrees) == (False, True)
+    for seed in range(5):
+        records = records_of(seed, {"a": 0.0, "b": 3.67}, noise=0.6, reflected=0.1)
+        found = probe_separation(records["a"], records["b"], DT, DEPTH, 3.67)
+        assert (found.known, found.disagrees) == (False, False)
+
+
 def test_what_says_nothing_of_positions_is_silent():
     wrong = {"fwd": 48.24, "cog": 52.09}
     right = {"fwd": 48.42, "cog": 52.09}

@@ -89,7 +89,7 @@ def draft_campaign(
             f"{', '.join(first.table.names)}). {next(iter(first.table.faults.values()), mend)}"
         )
     wave = next(iter(_inputs(guesses)), None)
-    seas = seas_of(read, guesses, wave) if wave else {}
+    seas, odd = seas_of(read, guesses, wave) if wave else ({}, {})
     runs = list(dict.fromkeys(file.run for file in read))
     named = {run: kind for run in runs if (kind := waves_of_name(run))}
     kinds = {run: "regular" if sea.regular else "irregular" for run, sea in seas.items()} | named
@@ -111,7 +111,7 @@ def draft_campaign(
         wave=wave,
         kinds=kinds,
         named_kinds=named,
-        roles=_roles(read, guesses, seas, kinds),
+        roles=_roles(read, guesses, seas, kinds, odd),
         paths_of={
             run: {file.logger: _relative(file.path, folder) for file in read if file.run == run}
             for run in runs
@@ -144,12 +144,16 @@ def _loggers(files: Files, guesses: Guesses) -> dict[str, Any]:
 
 
 def _roles(
-    files: Files, guesses: Guesses, seas: Seas, kinds: Mapping[str, str]
+    files: Files,
+    guesses: Guesses,
+    seas: Seas,
+    kinds: Mapping[str, str],
+    odd: Mapping[str, float],
 ) -> dict[str, tuple[str, str]]:
     """Role of each run, and why: irregular runs train, and one whose waves lie within theirs tests.
 
-    Runs without waves are not used, where others have some; nor are those that lack a file, or in
-    which a motion that others show is constant.
+    Runs without waves are not used, where others have some; nor are those that lack a file, whose
+    scale is an odd one, or in which a motion that others show is constant.
     """
     runs, loggers = dict.fromkeys(file.run for file in files), {file.logger for file in files}
     dead = dead_motions(files, guesses) if len(runs) > 1 else {}
@@ -161,6 +165,11 @@ def _roles(
         )
         if lacking := loggers - {file.logger for file in files if file.run == name}:
             why = f"it has no file of {', '.join(sorted(lacking))}"
+        elif name in odd:
+            why = (
+                f"guessed: its waves are {odd[name]:.3g} times those of the others (median), and "
+                "as steep: is it of another scale?"
+            )
         elif name in dead:
             why = f"guessed: {dead[name]} is constant, and moves in other runs: a dead sensor?"
         else:

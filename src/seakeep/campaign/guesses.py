@@ -32,7 +32,7 @@ from seakeep.conventions import (
 )
 from seakeep.errors import DataError
 from seakeep.formats import Columns
-from seakeep.formats.columns import is_unit, named_unit
+from seakeep.formats.columns import is_unit, named_unit, same_unit
 from seakeep.quality.faults import noise_share
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, past_midnight, stretches
@@ -49,6 +49,10 @@ USABLE = 0.9
 
 STILL = 0.05
 """Part of the highest run's waves below which a run has none."""
+
+AS_STEEP = 5.0
+"""Factor between the steepnesses (height per squared period) of two scales of one campaign; what a
+decay radiates is less steep than waves by more, at like periods."""
 
 SHORT_GAP = 0.25
 """Seconds: what ``gaps = "bridge"`` fills unless ``longest_gap`` says otherwise."""
@@ -115,7 +119,7 @@ class File:
 class Guess:
     """A guess for a column; `channel` is empty where nothing fits, and `why` says so.
 
-    `unit_from` says who states the unit: the file, the end of the column's name, or nobody.
+    `unit_from` says who states the unit: all files, some, the end of the column's name, or nobody.
     `at_rest` says that the motion or the wave does not show beside others, `behind` that a probe's
     name places it behind the vessel.
     """
@@ -123,7 +127,7 @@ class Guess:
     column: str
     header: str
     unit: str
-    unit_from: Literal["file", "name", "nobody"]
+    unit_from: Literal["files", "some", "name", "nobody"]
     channel: str = ""
     logger: str = ""
     why: str = ""
@@ -170,12 +174,23 @@ Seas = Mapping[str, Sea]
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
-    """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
+def seas_of(files: Files, guesses: Guesses, wave: Guess) -> tuple[dict[str, Sea], dict[str, float]]:
+    """Waves, as one probe recorded them, of each run that has some; decay tests have none.
+
+    A run of another scale is left out, so that the others are not still water beside it: how many
+    times the median of the others its waves are is the second result.
+    """
     series = {f: f.series(wave.column) for f in files if f.logger == wave.logger}
     seas = {f: sea for f, x in series.items() if x.size and (sea := _sea(f, x))}
-    highest = max((sea.height for sea in seas.values()), default=0.0)
-    seas = {file: sea for file, sea in seas.items() if sea.height > STILL * highest}
+    falling = sorted(seas.values(), key=lambda sea: -sea.height)
+    odd = {}
+    if len(falling) > 2:  # of two, none is the odd one
+        first, second, *_ = falling
+        beyond, steep = second.height <= STILL * first.height, (second.period / first.period) ** 2
+        if beyond and steep * first.height < AS_STEEP * second.height:
+            odd[first.group] = first.height / float(np.median([s.height for s in falling[1:]]))
+    highest = max((sea.height for sea in falling if sea.group not in odd), default=0.0)
+    seas = {f: s for f, s in seas.items() if f.run not in odd and s.height > STILL * highest}
     rate = min((file.rate or 1.0 for file in seas), default=1.0)
     records = {}
     for file in seas:
@@ -185,7 +200,7 @@ def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
     return {
         file.run: replace(sea, group=groups[file.run], start=_start(file.run, files, guesses))
         for file, sea in seas.items()
-    }
+    }, odd
 
 
 def _sea(file: File, series: FloatArray) -> Sea | None:
@@ -348,10 +363,13 @@ def dead_motions(files: Files, guesses: Guesses) -> dict[str, str]:
 def _guess(column: str, files: Files) -> Guess:
     table, logger = files[0].table, files[0].logger
     header = _printable(table.headers.get(column, column))
+    stated = [file.table.units[column] for file in files if column in file.table.units]
     if is_trigger(column):
         return Guess(column, header, "-", "nobody", why="pulses of a trigger")
-    name, unit = column, table.units.get(column)
-    stated_by: Literal["file", "name", "nobody"] = "file"
+    name, unit = column, next(iter(stated), None)
+    stated_by: Literal["files", "some", "name", "nobody"] = "files"
+    if unit is not None and len(stated) < len(files) and all(same_unit(unit, u) for u in stated):
+        stated_by = "some"
     if unit is None:
         bare, named = named_unit(column)
         stated_by = "nobody"

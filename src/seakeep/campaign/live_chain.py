@@ -186,7 +186,7 @@ class LiveChain:
         times = np.concatenate([last, arrays[name]]) * factor
         steps = np.diff(times)
         # Seconds of day count on after midnight, where no more than a window was lost there.
-        past = (steps < 0) & (steps % DAY <= self.window) & (times[1:] < DAY)
+        past = (steps < 0) & (steps % DAY <= self.window)
         days = np.cumsum([0.0, *np.where(past, -(steps // DAY), 0.0)])
         steps = np.where(past, steps % DAY, steps)
         if not np.all(steps > 0) or not np.all(np.isfinite(times)):

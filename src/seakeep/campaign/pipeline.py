@@ -334,14 +334,17 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
         ):
             raise RequestError(
                 f"channels.{name}: the unit '{unit}' is stated, and run '{run.name}' ({path}) says "
-                f"'{said}' for the column '{wanted}'. Leave unit out where the files say it; or, "
-                f"if this file is wrong, state the unit in [runs.{run.name}.channels.{name}]."
+                f"'{said}' for the column '{wanted}'. Leave unit out if all files say one; if "
+                f"some say none, state '{said}', and in [runs.RUN.channels.{name}] the unit of "
+                "each that has another; or, if this file is wrong, state its unit in "
+                f"[runs.{run.name}.channels.{name}]."
             )
         unit = said if unit is None else unit
         if unit is None:
             raise RequestError(
                 f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' "
-                f"to [channels.{name}] ('-' for none)."
+                f"to [channels.{name}] ('-' for none), or to [runs.{run.name}.channels.{name}] if "
+                "other files say another."
             )
         target = units_of(name, unit)
         factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")

@@ -200,8 +200,8 @@ def calibrate(
     folds: Annotated[
         Literal["run"] | None,
         Option(
-            help="'run': members trained on the other runs forecast each training run; by default "
-            "only windows that no member has read count."
+            help="'run': members trained on the runs of other waves forecast each training run; by "
+            "default only windows that no member has read count."
         ),
     ] = None,
     workers: Workers = None,

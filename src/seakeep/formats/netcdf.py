@@ -18,7 +18,8 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     """Read a NetCDF or HDF5 file: one variable per channel, all along one dimension.
 
     A set of shape (time, n) is split: by the labels of its second dimension, or ``NAME_1`` to
-    ``NAME_n``. `group` may be left out where one group alone holds channels.
+    ``NAME_n``; a vector may have the shape (1, time), as MATLAB writes it. `group` may be left out
+    where one group alone holds channels.
     """
     dataset = opened_netcdf(path, options.group)
     flat: dict[str, xr.DataArray] = {}
@@ -49,8 +50,8 @@ def read_netcdf(path: Path, options: Options) -> Columns:
             )
             continue
         values[name] = array.values.astype(float)
-        if "units" in array.attrs:
-            units[name] = _text(array.attrs["units"])
+        if said := [array.attrs[key] for key in ("units", "unit") if key in array.attrs]:
+            units[name] = _text(said[0])
     return Columns(values, units, faults)
 
 
@@ -109,6 +110,8 @@ def _group(path: Path, wanted: str | None) -> str | None:
 
 def _split(path: Path, name: str, array: xr.DataArray) -> dict[str, xr.DataArray]:
     """Channels of a variable: itself, or its columns where it has two dimensions."""
+    if array.ndim == 2 and array.shape[0] == 1:
+        array = array[0]
     if array.ndim == 1:
         return {name: array}
     if array.ndim > 2:

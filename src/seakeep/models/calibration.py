@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray, Progress, check_choice, fraction, whole_number
+from seakeep.conventions import is_elevation
 from seakeep.core.bands import (
     ConformalMargin,
     band_scale,
@@ -29,6 +30,7 @@ from seakeep.models.engine import Windows, member_series
 from seakeep.models.forecasts import reduce_members
 from seakeep.models.inputs import Signature
 from seakeep.models.training import TrainingArrays
+from seakeep.signals import repeated_waves
 
 Band = Literal["members", "calibrated"]
 BandScale = Literal["spread", "constant", "learnt"]
@@ -168,7 +170,7 @@ def calibrate(
         if known is None:
             cases[name] = ensemble, run
         elif len(ensemble.arrays.names) > 1:
-            cases[name] = ensemble.without(known), run
+            cases[name] = _without_waves_of(ensemble, known), run
         else:
             cases |= _parts(ensemble, name, run)
     judged = held_out(cases, steps, level, executor, progress)
@@ -274,6 +276,19 @@ def held_out(
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])
         judged[name] = Judged(values, measured, envelope_of(signature, windows), starts)
     return judged
+
+
+def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
+    """Members as they learn from runs of other waves; from all other runs where none has others."""
+    arrays, signature, alike = ensemble.arrays, ensemble.signature, [run]
+    if waves := [*map(is_elevation, signature.inputs)]:
+        at = waves.index(max(waves))  # the first elevation, if there is one
+        records = {n: x[:, at] for n, x in zip(arrays.names, arrays.delayed, strict=True)}
+        groups = repeated_waves(records, signature.dt)
+        alike = [name for name in records if groups[name] == groups[run]]
+    for name in alike if len(alike) < len(arrays.names) else [run]:
+        ensemble = ensemble.without(name)
+    return ensemble
 
 
 def _parts(ensemble: Ensemble, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:

@@ -696,10 +696,11 @@ class HankelEnsemble(Model):
             the windows of a single one.
         folds : {"run"}, optional
             For runs that train, read to their ends: each is forecast by the same members as they
-            learn from the other runs, or a third of a single run as they learn from the rest of
-            it; the margin goes to the members as they are. What the input map and the read-outs
-            learnt, they learnt from all of them. Members that learn from the run alone, or whose
-            window reaches into the third, are left out there.
+            learn from runs of other waves (from all other runs, where each repeats its waves), or a
+            third of a single run as they learn from the rest of it; the margin goes to the members
+            as they are. What the input map and the read-outs learnt, they learnt from all of them.
+            Members that learn from the run alone, or whose window reaches into the third, are left
+            out there.
         executor, progress
             As in :meth:`forecast`; a step is a member in one of the runs.
 

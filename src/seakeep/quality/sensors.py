@@ -63,6 +63,12 @@ class SensorsKind(Kind):
         "Check [rig.positions] of the campaign, the water depth and the probes' clocks. At forward "
         "speed dispersion does not hold: leave water_depth out of [rig].",
     )
+    NO_POSITION = (
+        "is stated to stand {limit:+.3f} from {other}, and at no distance do the phases of the "
+        "waves that both recorded fit (the correlation is {correlation:.2f} at best)",
+        "Check the water depth, [rig.positions], and signs and clocks of the probes. At forward "
+        "speed dispersion does not hold: leave water_depth out of [rig].",
+    )
 
 
 def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreement]:
@@ -183,13 +189,14 @@ def positions(record: Record) -> Findings:
     for each in misplaced_probes(series, places, step_of(run), depth):
         separation = each.separation
         yield record.finding(
-            SensorsKind.POSITION,
+            SensorsKind.POSITION if separation.known else SensorsKind.NO_POSITION,
             each.probe,
             separation.separation,
             separation.stated,
             "m",
             other=each.other,
             spread=separation.spread,
+            correlation=separation.correlation,
             error=separation.input_error,
             unsure="" if each.certain else ", or the other probe is misplaced",
         )

@@ -145,6 +145,9 @@ LEAST_WAVES = 20
 """Fewer waves in a record cover too few of the sea's frequencies."""
 LEAST_CORRELATION = 0.8
 """Below it, six tenths of the second record are not the first one carried to it."""
+COHERENT = 0.92
+"""Coherence of probes that surely record the same waves: where noise, reflections or short crests
+let right positions correlate below 0.8, it is 0.87 or less."""
 BEYOND_THEORY = 0.01
 """Fraction of a separation by which waves of a steepness ka of 0.14 are faster than in linear
 theory, (ka)²/2; a current of a hundredth of the phase speed does the same."""
@@ -171,6 +174,9 @@ class ProbeSeparation:
     input_error : float
         NRMSE of an elevation that is carried with the stated separation instead: the error
         that a model's input gets.
+    coherence : float
+        Correlation with each frequency carried at a speed of its own, as far as the phase goes
+        on evenly from one to the next: near 1 for the same waves whatever their speed.
     """
 
     separation: float
@@ -178,6 +184,7 @@ class ProbeSeparation:
     correlation: float
     stated: float
     input_error: float
+    coherence: float
 
     @property
     def known(self) -> bool:
@@ -186,11 +193,14 @@ class ProbeSeparation:
 
     @property
     def disagrees(self) -> bool:
-        """Whether the stated separation is surely wrong, and by as much as matters to a model."""
+        """Whether the stated separation is surely wrong, and by as much as matters to a model.
+
+        Or none fits waves that both have surely recorded, as with a wrong depth, sign or clock.
+        """
+        if not self.known:
+            return self.coherence >= COHERENT
         doubt = SURELY * self.spread + BEYOND_THEORY * abs(self.separation)
-        return (
-            self.known and abs(self.separation - self.stated) > doubt and self.input_error > MATTERS
-        )
+        return abs(self.separation - self.stated) > doubt and self.input_error > MATTERS
 
 
 @dataclass(frozen=True)
@@ -246,8 +256,8 @@ def misplaced_probes(
     list of Misplaced
         One for each probe that is surely misplaced, and one for each pair of which either may be.
         Records that are constant, short (20 waves) or regular, and pairs that correlate below 0.8,
-        say nothing: a reflection turns the phase of a single frequency, and only over many of
-        them does it average out.
+        say nothing, unless their coherence is 0.92: a reflection turns the phase of a single
+        frequency, and only over many of them does it average out.
 
     Raises
     ------
@@ -377,12 +387,15 @@ def probe_separation(
     )
     turned = np.abs(1.0 - np.exp(1j * k * (separation - place))) ** 2
     weight = np.abs(cross)
+    turns = cross[1:] * np.conj(cross[:-1])
+    even = np.abs(np.convolve(turns, np.ones(9) / 9)).sum() / np.abs(turns).sum()
     return ProbeSeparation(
         separation=float(separation),
         spread=float(_jackknife(np.array(without))),
         correlation=float(total.max()),
         stated=place,
         input_error=math.sqrt(np.sum(weight * turned) / np.sum(weight)),
+        coherence=float(weight.sum() * even),
     )
 
 
