@@ -110,6 +110,7 @@ CHANGES = {
         ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ('replace(alignment.settings, surge="measured")', 'replace(alignment.settings, surge="none")', "check/test_response.py::test_measured_phases_count_from_the_waves_where_the_vessel_is"),
         ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
+        ("each *= follows.gain(frequency)[:, None]", "pass", "check/test_response.py::test_a_model_that_follows_its_surge_answers_what_its_carriers_read"),
         ("early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("np.hypot(radius, np.abs(gain - other(spectra.frequency)))", "radius", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
         ("type_b = np.hypot(accuracy[1:], ratio * accuracy[0])", "type_b = np.hypot(accuracy[1:], 0 * ratio)", "check/test_response.py::test_accuracy_of_the_instruments_widens_the_interval"),

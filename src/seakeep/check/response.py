@@ -62,7 +62,8 @@ def response(
     r"""Transfer functions of a model from its matrices, per input and for a passing wave.
 
     The answer to small waves: observables that are squares or cubes vanish there. Inputs are those
-    that the model is driven by: with an alignment, waves where the vessel is.
+    that the model is driven by: with an alignment, waves where the vessel is, and of a model that
+    follows its own surge what its carriers read of them at the mean surge of training.
 
     Parameters
     ----------
@@ -122,6 +123,8 @@ def response(
     names = list(model.inputs)
     waves, size, turns = names, len(names), None
     each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in dynamics])
+    if follows := model.signature.input_map.follows:
+        each *= follows.gain(frequency)[:, None]
     if runs and size > 1:
         probe = reference_probe(model, runs)
         turns = wave_turns(model, runs, frequency, probe)

@@ -27,6 +27,7 @@ import xarray as xr
 
 from seakeep.arrays import (
     TINY,
+    ComplexArray,
     Datasets,
     FloatArray,
     IntArray,
@@ -36,7 +37,7 @@ from seakeep.arrays import (
     number,
 )
 from seakeep.conventions import is_elevation
-from seakeep.core.recursion import Place
+from seakeep.core.recursion import Place, read_table
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel, Span
@@ -622,6 +623,33 @@ class Following:
             first.
         """
         return _lines(self, self.alignment.rig(run), places)
+
+    def gain(self, frequency: FloatArray) -> ComplexArray:
+        """What carriers read of waves, over the wave at the mean place of training.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (frequency,)
+            Hz.
+
+        Returns
+        -------
+        ndarray of complex, shape (frequency, Q)
+            1 of an input that is not carried.
+        """
+        rig, omega, place = self.alignment.rig(), 2 * np.pi * frequency, self.place
+        out = np.ones((omega.size, len(rig.positions)), dtype=complex)
+        samples = np.arange(-self.back, self.ahead + 1) - self.lead
+        turn = np.exp(1j * self.dt * np.outer(omega, samples))
+        at = np.array([each or 0.0 for each in rig.positions])
+        for bank in self.banks(None):
+            table = bank.taps.reshape(1, place.count, -1)
+            taps = read_table(place, table, np.zeros(1, dtype=np.intp), np.array([place.centre]))
+            target = at[bank.column] + rig.offsets[bank.column] + place.centre
+            behind = np.outer(wavenumber(omega, rig.depth), at[[*bank.columns]] - target)
+            taps = taps.reshape(bank.taps.shape[1:])
+            out[:, bank.column] = np.einsum("pt,ft,fp->f", taps, turn, np.exp(-1j * behind))
+        return out
 
     @property
     def placed(self) -> tuple[int, ...]:
