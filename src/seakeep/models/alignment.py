@@ -37,7 +37,7 @@ from seakeep.arrays import (
     number,
 )
 from seakeep.conventions import is_elevation
-from seakeep.core.recursion import Place, read_table
+from seakeep.core.recursion import Place
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel, Span
@@ -637,18 +637,16 @@ class Following:
         ndarray of complex, shape (frequency, Q)
             1 of an input that is not carried.
         """
-        rig, omega, place = self.alignment.rig(), 2 * np.pi * frequency, self.place
-        out = np.ones((omega.size, len(rig.positions)), dtype=complex)
-        samples = np.arange(-self.back, self.ahead + 1) - self.lead
-        turn = np.exp(1j * self.dt * np.outer(omega, samples))
+        rig, omega, place = self.alignment.rig(), 2 * np.pi * frequency[:, None, None], self.place
         at = np.array([each or 0.0 for each in rig.positions])
+        out = np.ones((len(frequency), len(at)), dtype=complex)
+        later = self.dt * (np.arange(-self.back, self.ahead + 1) - self.lead)
+        part, row = math.modf((place.centre - place.lowest) / place.spacing)
         for bank in self.banks(None):
-            table = bank.taps.reshape(1, place.count, -1)
-            taps = read_table(place, table, np.zeros(1, dtype=np.intp), np.array([place.centre]))
-            target = at[bank.column] + rig.offsets[bank.column] + place.centre
-            behind = np.outer(wavenumber(omega, rig.depth), at[[*bank.columns]] - target)
-            taps = taps.reshape(bank.taps.shape[1:])
-            out[:, bank.column] = np.einsum("pt,ft,fp->f", taps, turn, np.exp(-1j * behind))
+            below, above = bank.taps[int(row) : int(row) + 2]
+            apart = at[[*bank.columns]] - at[bank.column] - rig.offsets[bank.column] - place.centre
+            waves = np.exp(1j * (omega * later - wavenumber(omega, rig.depth) * apart[:, None]))
+            out[:, bank.column] = np.tensordot(waves, below + part * (above - below))
         return out
 
     @property
