@@ -122,9 +122,12 @@ def response(
         )
     names = list(model.inputs)
     waves, size, turns = names, len(names), None
+    input_map = model.signature.input_map
+    read = np.exp(2j * np.pi * frequency * model.dt * input_map.lead)[:, None]
+    if input_map.follows:
+        read = input_map.follows.gain(frequency)
     each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in dynamics])
-    if follows := model.signature.input_map.follows:
-        each *= follows.gain(frequency)[:, None]
+    each *= read[:, None]
     if runs and size > 1:
         probe = reference_probe(model, runs)
         turns = wave_turns(model, runs, frequency, probe)
@@ -174,11 +177,7 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
         own.input_delays,
     )
     scale = np.concatenate([own.input_scale.std, own.direct_scale.std])
-    input_map = model.signature.input_map
-    lead = (input_map.follows or input_map).lead  # of delayed columns, in samples
-    early = np.exp(2j * np.pi * frequency * model.dt * lead)
-    early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
-    return gain * own.state_scale.std[:, None] / scale * early[:, None]
+    return gain * own.state_scale.std[:, None] / scale
 
 
 def frequency_response(

@@ -625,7 +625,7 @@ class Following:
         return _lines(self, self.alignment.rig(run), places)
 
     def gain(self, frequency: FloatArray) -> ComplexArray:
-        """What carriers read of waves, over the wave at the mean place of training.
+        """What carriers read at an instant of waves, over the wave then at the mean place.
 
         Parameters
         ----------
@@ -640,7 +640,7 @@ class Following:
         rig, omega, place = self.alignment.rig(), 2 * np.pi * frequency[:, None, None], self.place
         at = np.array([each or 0.0 for each in rig.positions])
         out = np.ones((len(frequency), len(at)), dtype=complex)
-        later = self.dt * (np.arange(-self.back, self.ahead + 1) - self.lead)
+        later = self.dt * np.arange(-self.back, self.ahead + 1)
         part, row = math.modf((place.centre - place.lowest) / place.spacing)
         for bank in self.banks(None):
             below, above = bank.taps[int(row) : int(row) + 2]
