@@ -70,6 +70,22 @@ def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
     assert np.all(np.diff(ranked[np.isfinite(ranked)]) <= 0)
 
 
+def test_troughs_have_a_law_of_their_own(model, train):
+    run = sea_run(seed=3)
+    run["heave"] = run.heave.where(run.heave > 0, 1.5 * run.heave)
+    found, turned = (
+        check.statistics(model, {"test": run.assign(heave=sign * run.heave)}).sel(kind="measured")
+        for sign in (1, -1)
+    )
+    # Half a wave more or less at either end, and the mean.
+    assert found.trough.values == pytest.approx(turned.extreme.values, rel=0.02)
+    assert found.deepest.values == pytest.approx(turned.peak.max("rank").values, rel=1e-6)
+    assert 1.3 * found.extreme < found.trough < found.trough_upper
+    load = train.assign(load=train.heave.assign_attrs(units="N"))
+    spec = HankelDMDc(0, 1, 1e-6, delay_rows="exact").fit({"train": load}, ["load"], ["eta"])
+    assert check.statistics(spec, {"test": load}).trough.isnull().all()
+
+
 def test_statistics_at_full_scale_follow_froudes_law(model, train):
     run = sea_run(seed=3, scale_factor=36.0)
     own = model.settings.fit({"train": to_full_scale(train, 36.0)}, ["heave"], ["eta"])

@@ -5,15 +5,16 @@ from math import tau
 
 import numpy as np
 import pytest
-from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run
+from drifting import FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES, drifting_run
 from moored import moored_run
 from numpy.random import default_rng
 from records import record, rms
 from seas import Sea
 
-from seakeep import HankelDMDc, check
+from seakeep import HankelDMDc, Powers, check
 from seakeep.check.parts import reference_probe
 from seakeep.core.spectra import estimate, harmonic_fits
+from seakeep.waves import wavenumber
 
 DT, DEPTH, PLACES = 0.1, 3.6, {"eta_fwd": -1.5, "eta_cog": 0.0}
 FREQUENCIES = np.array([0.3, 0.5, 0.8])
@@ -122,6 +123,29 @@ def test_measured_phases_count_from_the_waves_where_the_vessel_is():
     assert error[regular] < 0.01
     # From the probe this drift of 0.6 m both ways, by up to 100°, leaves half of the answer.
     assert rms(error[~regular]) < 0.1
+
+
+def test_a_model_that_follows_its_surge_answers_what_its_carriers_read():
+    observables = (SQUARES, Powers(tuple(INPUTS)))  # of small waves nothing
+    spec = HankelDMDc(10, 40, 1e-3, delay_rows="exact", alignment=FOLLOWED, observables=observables)
+    runs = {str(seed): drifting_run(seed) for seed in range(3)}
+    model = spec.fit(runs, STATES, INPUTS)
+    # Without look-ahead carriers read these waves wrongly by an eighth, a twelfth and a half.
+    waves = np.array([0.3, 0.7, 0.85])
+    found = check.response(model, waves, runs).sel(input="wave", state="heave")
+    place, time = model.signature.input_map.follows.place.centre, DT * np.arange(-600, 1300)
+    rest = np.tile(model.state_mean, (600, 1))
+    for wave, expected in zip(waves, phasors(found), strict=True):
+        k = float(wavenumber(tau * wave, DEPTH))
+        eta = np.cos(tau * wave * time[:, None] - k * np.array([*POSITIONS.values()]))
+        moved, still = (
+            model.forecast_arrays(rest, each[:600], each[600:], 1200)[-200:, 1]
+            for each in (1e-5 * eta, 0 * eta)
+        )
+        turn = tau * wave * time[1600:1800] - k * (POSITIONS["eta_cog"] + place)
+        answered = (expected * np.exp(1j * turn)).real
+        # Without waves the squares let surge rest some millimetres from its mean.
+        assert (moved - still) / 1e-5 == pytest.approx(answered, abs=0.02)
 
 
 def test_accuracy_of_the_instruments_widens_the_interval(model):

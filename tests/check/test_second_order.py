@@ -55,6 +55,27 @@ def test_drift_is_counted_from_the_rest_in_the_wind_of_the_run():
     law = 0.5 * GAIN / (1.0 - MEMORY)
     assert found.slow_response.values[0, 0] == pytest.approx(law, rel=1e-4)  # the ridge
     assert found.offset[0, 0] == pytest.approx(law, rel=1e-2)  # windows of whole periods
+    assert found.attrs["rest"] == "as the model has it"
+
+    # A surge that rests 0.4 m farther than the model's, in waves and, in another wind, without.
+    def farther(run, mean):
+        return blown(run, mean).assign(surge=lambda each: each.surge + 0.4)
+
+    calm = farther(drifting_run(waves=0.0).map(lambda each: each.copy(data=0 * each)), 2.0)
+    runs = {"regular": farther(REGULAR, 7.0), "calm": calm.assign_attrs(waves="still")}
+    found = check.drift(model, runs)
+    assert found.attrs["rest"] == "measured in calm"
+    # A quarter of a record holds no whole periods of the wind; 0.4 m are 1.6 m per m².
+    assert found.offset[0, 0] == pytest.approx(law, abs=0.1)
+
+
+def test_drift_is_probed_where_waves_train_alone():
+    def driven(run):
+        force = np.sin(tau * 3.0 * run.time.values)
+        return run.assign(force=run.eta.copy(data=force))
+
+    model = SQUARE.fit(driven(drifting_run()), ["surge"], ["eta", "force"])
+    assert check.drift(model, {"sea": driven(drifting_run())}).frequency.max() < 1.7
 
 
 def test_slow_squares_answer_by_their_filter():

@@ -321,9 +321,10 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         Over (state, difference, frequency): ``slow_response`` (in ``units`` over state, per m²),
         at difference 0 the mean; ``phase`` (degrees, against the wave group at the reference
         probe); over (point, state): ``offset`` and ``offset_uncertainty`` of regular runs,
-        per amplitude squared, counted from the model's rest in still water where all but the waves
-        is as in the run, with ``run`` and ``point_frequency``. ``attrs``: ``amplitude`` (m) and
-        ``reference``.
+        per amplitude squared, counted from the rest in still water where all but the waves is as in
+        the run, with ``run`` and ``point_frequency``. The rest is the mean over the last quarter of
+        runs in still water, decays among them; without such runs it is the model's. ``attrs``:
+        ``amplitude`` (m), ``reference``, and ``rest``, where that is from.
 
     Raises
     ------
@@ -343,7 +344,8 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     samples = round(PERIODS * mean_period(runs, model.inputs))
     step = 1.0 / (samples * model.dt)
     every = np.arange(1, int(0.4 / model.dt / step))
-    known = every[single.coverage.is_trained(step * every.astype(float)).any(axis=0)]
+    trained = single.coverage.is_trained(step * every.astype(float))
+    known = every[trained[single.coverage.channels.index(model.inputs[reference])]]
     if not known.size:
         raise DataError("training holds no waves by which the model could be probed.")
     bins = known[np.linspace(0, known.size - 1, min(PROBED, known.size)).round().astype(int)]
@@ -370,16 +372,21 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
             forces[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
     forces[read_off(model)] = np.nan
-    # Offsets of regular runs from the model's rest, per amplitude squared.
+    # Offsets of regular runs from the rest, per amplitude squared.
     offsets: dict[str, Any] = {}
+    ends = _ends(single, runs)
     if regular := {name: run for name, run in runs.items() if is_regular(run)}:
         parts = used_parts(model, regular)
         at = points_of(model, regular, parts)
         used = [parts[str(run)].inputs for run in at["run"].values]
+        used += [inputs for _, inputs in ends.values()]
         calm = [np.where(waves, 0.0, each.mean(axis=0)) for each in used]
         columns = np.stack([_columns(single, each[None])[0] for each in calm])
         means = np.concatenate([single.input_scale.mean, single.signature.direct_scale.mean])
         rests = single.state_mean + (columns - means) @ slow[0].real.T
+        rests, still = np.split(rests, [at.sizes["point"]])
+        if ends:  # what the model errs in still water
+            rests += np.mean([x.mean(axis=0) for x, _ in ends.values()] - still, axis=0)
         square = at["wave_amplitude"].values[:, None] ** 2
         offset = at["offset"].values + single.state_scale.centre - rests
         offsets = {
@@ -403,8 +410,23 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
             "frequency": ("frequency", step * bins, HERTZ),
             "units": ("state", [f"{unit}/m²" for unit in units_of(model, single.states)]),
         },
-        attrs={"amplitude": amplitude, "reference": model.inputs[reference]},
+        attrs={
+            "amplitude": amplitude,
+            "reference": model.inputs[reference],
+            "rest": f"measured in {', '.join(ends)}" if ends else "as the model has it",
+        },
     )
+
+
+def _ends(model: HankelDMDcModel, runs: Datasets) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """States and inputs over the last quarter of runs in still water, where all are known."""
+    ends = {}
+    for name, run in runs.items():
+        last = slice(-(run.sizes["time"] // 4), None)
+        both = [channel_matrix(run, each, name, last) for each in (model.states, model.inputs)]
+        if run.attrs.get("waves") == "still" and all(np.isfinite(each).all() for each in both):
+            ends[name] = (both[0], both[1])
+    return ends
 
 
 def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:

@@ -25,6 +25,7 @@ BAND = 2.0
 HOURS = 3.0
 KINDS = ("measured", "forecast")
 PLACES = 161
+EXTREME = ("extreme", "extreme_lower", "extreme_upper")
 
 
 def statistics(
@@ -32,7 +33,7 @@ def statistics(
 ) -> xr.Dataset:
     r"""Peaks of each state over the test parts in irregular waves, measured and forecast.
 
-    A peak is the largest deviation from the mean of its run between two zero-up-crossings. One
+    A peak is the largest deviation above the mean of its run between two zero-up-crossings. One
     counts where the record goes from below to above the mean by two SDs of the sensor's noise,
     ``attrs["noise_std"]`` of the channel.
 
@@ -55,8 +56,10 @@ def statistics(
         ``significant_double_amplitude`` (four SDs), ``zero_crossing_period`` (s), ``peaks`` (how
         many), ``rayleigh_scale`` (the SD), ``weibull_shape`` and ``weibull_scale`` (maximum
         likelihood), ``extreme`` (most probable in the duration by Weibull's law) with
-        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know); over (state,
-        kind, rank): ``peak`` and ``exceedance``, largest first; over (state, kind, place):
+        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know), and the same of
+        troughs, ``trough``…, with the largest, ``deepest``: NaN of loads in N, which count upward;
+        over (state, kind, rank): ``peak`` and ``exceedance``, largest first; over (state, kind,
+        place):
         ``density`` of the deviations at ``deviation`` over (state, place); over state:
         ``divergence`` (Jensen–Shannon) of the two densities, NaN where one stands still.
         ``attrs["duration"]`` (s).
@@ -74,12 +77,18 @@ def statistics(
         scale = 1.0 if facts.get("scale") == "full" else facts.get("scale_factor", 1.0)
         duration = 3600 * HOURS / np.sqrt(scale)
     moved = {kind: deviations(known, kind) for kind in KINDS}
-    parts = []
+    parts, units = [], units_of(model, model.states)
     for column, state in enumerate(model.states):
         noise = [waves[name][state].attrs.get("noise_std", 0.0) for name in known]
-        laws = [
-            _law([x[:, column] for x in of], noise, model.dt, duration) for of in moved.values()
-        ]
+        laws, known_below = [], np.nan if units[column] == "N" else 1.0
+        for of_kind in moved.values():
+            above, below = (
+                _law([side * x[:, column] for x in of_kind], noise, model.dt, duration)
+                for side in (1, -1)
+            )
+            troughs = {k.replace("extreme", "trough"): known_below * below[k] for k in EXTREME}
+            troughs["deepest"] = known_below * below["peak"].max()
+            laws.append(above.assign(troughs))
         parts.append(xr.concat(laws, xr.Variable("kind", list(moved)), join="outer"))
     names = xr.Variable("state", model.states)
     out = xr.concat(parts, names, join="outer").drop_vars("rank").transpose("state", ...)
@@ -90,7 +99,6 @@ def statistics(
     out["density"] = (("state", "kind", "place"), density)
     divergence = [jensen_shannon(*x) if np.isfinite(x).all() else np.nan for x in density]
     out["divergence"] = ("state", divergence)
-    units = units_of(model, model.states)
     return out.assign_coords(units=("state", units)).assign_attrs(duration=duration, of=of)
 
 
@@ -124,7 +132,7 @@ def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float
     spread = np.sqrt(np.mean(np.concatenate(moved) ** 2))
     period = periods.mean() if periods.size else np.nan
     law = fit_weibull(peaks)
-    extreme, lower, upper = most_probable_extreme(law, duration / period if period else np.nan)
+    extreme = most_probable_extreme(law, duration / period if period else np.nan)
     return xr.Dataset(
         {
             "significant_double_amplitude": 4 * spread,
@@ -133,9 +141,7 @@ def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float
             "rayleigh_scale": spread,
             "weibull_shape": law.shape,
             "weibull_scale": law.scale,
-            "extreme": extreme,
-            "extreme_lower": lower,
-            "extreme_upper": upper,
+            **dict(zip(EXTREME, extreme, strict=True)),
             "peak": ("rank", -np.sort(-peaks)),
             "exceedance": ("rank", rank / (peaks.size + 1)),
         },

@@ -62,7 +62,8 @@ def response(
     r"""Transfer functions of a model from its matrices, per input and for a passing wave.
 
     The answer to small waves: observables that are squares or cubes vanish there. Inputs are those
-    that the model is driven by: with an alignment, waves where the vessel is.
+    that the model is driven by: with an alignment, waves where the vessel is, and of a model that
+    follows its own surge what its carriers read of them at the mean surge of training.
 
     Parameters
     ----------
@@ -121,7 +122,12 @@ def response(
         )
     names = list(model.inputs)
     waves, size, turns = names, len(names), None
+    input_map = model.signature.input_map
+    read = np.exp(2j * np.pi * frequency * model.dt * input_map.lead)[:, None]
+    if input_map.follows:
+        read = input_map.follows.gain(frequency)
     each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in dynamics])
+    each *= read[:, None]
     if runs and size > 1:
         probe = reference_probe(model, runs)
         turns = wave_turns(model, runs, frequency, probe)
@@ -171,11 +177,7 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
         own.input_delays,
     )
     scale = np.concatenate([own.input_scale.std, own.direct_scale.std])
-    input_map = model.signature.input_map
-    lead = (input_map.follows or input_map).lead  # of delayed columns, in samples
-    early = np.exp(2j * np.pi * frequency * model.dt * lead)
-    early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
-    return gain * own.state_scale.std[:, None] / scale * early[:, None]
+    return gain * own.state_scale.std[:, None] / scale
 
 
 def frequency_response(

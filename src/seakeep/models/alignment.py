@@ -27,6 +27,7 @@ import xarray as xr
 
 from seakeep.arrays import (
     TINY,
+    ComplexArray,
     Datasets,
     FloatArray,
     IntArray,
@@ -622,6 +623,31 @@ class Following:
             first.
         """
         return _lines(self, self.alignment.rig(run), places)
+
+    def gain(self, frequency: FloatArray) -> ComplexArray:
+        """What carriers read at an instant of waves, over the wave then at the mean place.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (frequency,)
+            Hz.
+
+        Returns
+        -------
+        ndarray of complex, shape (frequency, Q)
+            1 of an input that is not carried.
+        """
+        rig, omega, place = self.alignment.rig(), 2 * np.pi * frequency[:, None, None], self.place
+        at = np.array([each or 0.0 for each in rig.positions])
+        out = np.ones((len(frequency), len(at)), dtype=complex)
+        later = self.dt * np.arange(-self.back, self.ahead + 1)
+        part, row = math.modf((place.centre - place.lowest) / place.spacing)
+        for bank in self.banks(None):
+            below, above = bank.taps[int(row) : int(row) + 2]
+            apart = at[[*bank.columns]] - at[bank.column] - rig.offsets[bank.column] - place.centre
+            waves = np.exp(1j * (omega * later - wavenumber(omega, rig.depth) * apart[:, None]))
+            out[:, bank.column] = np.tensordot(waves, below + part * (above - below))
+        return out
 
     @property
     def placed(self) -> tuple[int, ...]:

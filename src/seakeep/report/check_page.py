@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.check import Checked
-from seakeep.conventions import displayed
+from seakeep.conventions import displayed, is_elevation
 from seakeep.report.figures import checks
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import shown_unit
@@ -165,6 +165,12 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     per, words, tables = reference, [], []
     if "wave" in result["input"]:
         per = f"a wave that passes all probes, counted from {reference}"
+    every = {*result["input"].values} - {"wave"}
+    if others := ", ".join(sorted(name for name in every if not is_elevation(name, rates=True))):
+        words.append(
+            f"Besides the waves, inputs ({others}) are at their means in the response and decay of "
+            "the model. In the measured ones they act, as a damper that is an input does."
+        )
     unknown = result["amplitude"].isnull().all(["input", "frequency"])
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
@@ -341,12 +347,18 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
-    extreme = ("extreme", "extreme_lower", "extreme_upper")
-    shown = _as_shown(result, "mean", "significant_double_amplitude", *extreme)
+    extremes = [side + end for side in ("extreme", "trough") for end in ("", "_lower", "_upper")]
+    shown = _as_shown(result, "mean", "significant_double_amplitude", *extremes)
     # An extreme counts with its interval, and a divergence is that of the forecast.
-    known = shown["extreme_lower"].notnull() & shown["extreme_upper"].notnull()
-    shown["extreme"] = shown["extreme"].where(known)
+    for key in ("extreme", "trough"):
+        shown[key] = shown[key].where(np.isfinite(shown[f"{key}_upper"]))
     shown["divergence"] = shown["divergence"].where(shown["kind"] == "forecast")
+    points = [
+        f"{at['state'].item()}: the largest deviation measured is beyond the extreme expected. "
+        "The law does not hold for the largest, as where seas of several kinds are judged together."
+        for at in entries(result.sel(kind="measured"), "state")
+        if at["extreme"] < at["peak"].max() or at["trough"] < at["deepest"]
+    ]
     return section(
         "statistics",
         drawing("exceedance", checks.exceedance, result),
@@ -357,6 +369,7 @@ def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
             of=result.attrs["of"],
             hours=result.attrs["duration"] / 3600,
         ),
+        points=points,
     )
 
 
@@ -387,9 +400,9 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
         for own in entries(shown.dropna("state", how="all", subset=["slow_response"]), "state"):
             model = own["slow_response"][0].interp(frequency=own["point_frequency"])
             rows += entries(own.assign(model=model), "point")
-    return section(
-        "drift", drawing("drift", checks.drift, result), table("drift", rows), **result.attrs
-    )
+    known = result.attrs
+    figure = drawing("drift", checks.drift, result, **known)
+    return section("drift", figure, table("drift", rows, **known), **known)
 
 
 CHECK_SECTIONS = {
