@@ -703,8 +703,7 @@ class Live:
         )
         table = None if follows is None else drive.table(first, stop)
         self._table = first, table
-        rows = slice(first, stop)
-        self._delayed[rows], self._direct[rows] = drive.rows(first, stop, table)
+        self._delayed[first:stop], self._direct[first:stop] = drive.rows(first, stop, table)
 
     @one_blas_thread()
     def forecast(
