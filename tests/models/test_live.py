@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import seakeep.models.live
 from seakeep import HankelDMDc, Powers, load_live
 from seakeep.core.kalman import DelayFilter
-from seakeep.models.live import LEAST_RECORD, MOTIONS
+from seakeep.models.live import CONSISTENCY, LEAST_RECORD, MOTIONS
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import foresee
@@ -226,9 +226,35 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     widened = table((pushed / calm).sel(statistic="std"), ["sway", "heave"])[0]
     assert widened == pytest.approx([np.sqrt(sway), 1.0], rel=1e-9)
     assert pushed.sway.attrs["lead_time"] < calm.sway.attrs["lead_time"]
-    # A push of 2 SD that ended six time constants ago is forgotten; over all samples, 3 would stay.
-    ended, _ = after(np.where(np.arange(3000) < 1500, 2.0, 0.0))
+    # A push of 2 SD adds 4 to the squares of one step. If it began 400 samples ago it shows (over
+    # all samples, as 0.5); if it ended 330 ago, 256 and a free run of 64 or more, it is forgotten,
+    # of which running means would keep e^(−330/256) = .28.
+    begun, _ = after(np.where(np.arange(3000) < 2600, 0.0, 2.0))
+    assert begun.consistency_by_state[0, 0] == pytest.approx(
+        1 + 4 * (1 - np.exp(-400 / 256)), abs=1
+    )
+    ended, _ = after(np.where(np.arange(3000) < 2670, 2.0, 0.0))
     assert ended.consistency_by_state[0, 0] == pytest.approx(1.0, abs=0.3)
+    assert ended.validity == Validity(0)
+
+
+def test_no_claim_exceeds_what_errors_of_late_and_departures_allow(model, drift, monkeypatch):
+    loud = drift.copy(deep=True)
+    for name in STATES:
+        loud[name].values *= 1.5
+    live, of_late = started(model, loud), np.ones((2, len(STATES)))
+    monkeypatch.setattr(type(live), "consistency_by_state", of_late)
+    calm = driven(live, loud)
+    scale = model.signature.state_scale
+    away = table(loud, STATES)[:START] - scale.centre
+    usual = np.maximum(scale.spread**2, np.mean(away**2, axis=0))
+    assert np.all(usual > 1.5 * scale.spread**2)
+    most = np.sqrt(usual + (mean(calm) - scale.centre) ** 2)
+    assert np.all(1e3 * std(calm)[-1] > most[-1])
+    of_late[0] = 1e6  # one step ahead alone
+    assert_allclose(std(driven(live, loud)), np.minimum(1e3 * std(calm), most), rtol=1e-9)
+    of_late[1] = 1e6  # in free runs too
+    assert_allclose(std(driven(live, loud)), 1e3 * std(calm), rtol=1e-9)
 
 
 def test_outside_the_training_the_band_widens_and_says_why(model, drift, monkeypatch):
@@ -304,6 +330,17 @@ def test_filled_waves_drive_no_free_run(model, waves, motions):
     assert np.isnan(gaps.consistency_by_state[1]).all()
     # What is not judged is forgotten.
     assert np.all(np.abs(live.consistency_by_state[1] - 1) < 0.3 * np.abs(before - 1))
+
+
+def test_waves_that_were_filled_from_few_samples_judge_nothing(model, waves, motions):
+    begins, sound, holed = model.history_samples, model.live(), model.live()
+    for at in range(2 * begins + 20):
+        sound.step(waves[at], motions[at])
+        holed.step(None if at == 5 else waves[at], motions[at])
+        one_step = holed.consistency_by_state[0]
+        assert np.isnan(one_step).any() or at > begins + 5
+    late = [each.consistency_by_state[0] for each in (sound, holed)]
+    assert np.all(np.isfinite(late))
 
 
 @pytest.mark.parametrize("value", [9.97e36, 1e200])
@@ -534,8 +571,9 @@ def test_what_is_kept_does_not_grow_and_does_not_count(live, drift, tmp_path):
     # Python's own caches; arrays of what came since would hold 500 rows of 4 numbers.
     assert tracemalloc.get_traced_memory()[0] - before < 8 * 4 * 500
     tracemalloc.stop()
-    # Inputs, whether they were lost, and estimated states; of the rest no more than delays reach.
-    kept = LEAST_RECORD * 8 * (2 * len(INPUTS) + len(STATES))
+    # Inputs, whether they were lost, and estimated states; squared errors of late; of the rest no
+    # more than delays reach.
+    kept = 8 * (LEAST_RECORD * (2 * len(INPUTS) + len(STATES)) + CONSISTENCY * 2 * len(STATES))
     assert kept < size < kept + 8_000
 
 

@@ -74,7 +74,7 @@ LEAST_RECORD = 512
 """Samples of record that are kept at least."""
 CONSISTENCY = 256
 """Samples over which the consistency is averaged, as a time constant; twice as many as a free run
-lasts, at least, where it is that of free runs."""
+lasts, at least, where it is that of free runs. After a fault as many, or a free run, suffice."""
 SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 ALARM = 2.0
@@ -262,8 +262,8 @@ class Live:
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         inputs = len(signature.inputs)
         widths = inputs, inputs, count, count, *(each.mean.size for each in signature.scales[1:])
-        self._rows = [np.full((2 * self._record, width), np.nan) for width in widths]
-        self._u, self._lost, self._x, self._y, self._delayed, self._direct = self._rows
+        self._rows = [np.full((2 * self._record, width), np.nan) for width in (*widths, 2 * count)]
+        self._u, self._lost, self._x, self._y, self._delayed, self._direct, self._apart = self._rows
         self._count = _Counts()
         self._jumps, self._jumped = Jumps(self._smoothest()), np.zeros(inputs + count, bool)
         # Of the samples whose estimates are not final; None of a complete sample after complete
@@ -330,8 +330,7 @@ class Live:
         longer than that, the model no longer fits the vessel, or a sensor its channel.
         """
         known = self.consistency_by_state
-        known = known[np.isfinite(known)]
-        return float(known.mean()) if known.size else math.nan
+        return float(ratio(np.nansum(known), np.isfinite(known).sum()))
 
     @property
     def consistency_by_state(self) -> FloatArray:
@@ -341,11 +340,20 @@ class Live:
         from the estimate, are driven by the waves as they were measured, and last as long as those
         of training, whose errors at each lead they are compared with. A small error of each step
         that is always the same, as in waves outside the training, shows in the second row long
-        before the first. NaN where there is none yet.
+        before the first. NaN where there is none yet. Where the plain mean over the last 256
+        samples, or as many as a free run lasts if these are more, is smaller, it is that.
         """
         self._finish()
         means: FloatArray = ratio(*self._squares)
-        return means
+        # Those of late alone forget what is over; what was not judged counts as the mean.
+        late = self._of_late.reshape(-1, *means.shape) - means
+        return means + np.minimum(np.nansum(late, axis=0) / max(len(late), 1), 0.0)
+
+    @property
+    def _of_late(self) -> FloatArray:
+        """Squares of so many samples that free runs reach each lead, and 256 at least."""
+        samples = max(CONSISTENCY, self.errors.longest)
+        return self._apart[max(self._pending - samples, 0) : self._pending]
 
     @property
     def conditions(self) -> Conditions | None:
@@ -661,18 +669,18 @@ class Live:
         measured = self._y[at]
         squares = np.full((2, measured.size), np.nan)
         with undefined():
-            squares[0] = (innovation / (update.deviations if update else self._deviations)) ** 2
+            if is_driven or at >= 2 * self._begins:  # before, waves are filled from few
+                squares[0] = (innovation / (update.deviations if update else self._deviations)) ** 2
             if lead:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
                 squares[1] = ((measured - predicted) / self.errors.at(lead)) ** 2
-        known = ~np.isnan(squares)
-        self._squares *= np.where(known, self._fade, 1.0)
-        self._squares[0] += np.where(known, np.minimum(squares, SPIKE), 0.0)
-        self._squares[1] += known
         if not is_driven:
-            sums, weights = self._squares[:, 1]
-            sums += (1.0 - self._fade[1]) * (weights - sums)
+            squares[1] = ratio(*self._squares[[1, 1], 1])
+        squares = np.minimum(squares, SPIKE)
+        self._apart[at] = squares.ravel()
+        grown = self._fade * self._squares + [squares, np.ones_like(squares)]
+        self._squares = np.where(np.isnan(squares), self._squares, grown)
         lead = (lead + 1) % (self.errors.longest + 1) if lead else 0
         if not lead and is_driven and (update is None or self._noise.any()):
             self._free[:], lead = self._history, 1
@@ -695,8 +703,7 @@ class Live:
         )
         table = None if follows is None else drive.table(first, stop)
         self._table = first, table
-        rows = slice(first, stop)
-        self._delayed[rows], self._direct[rows] = drive.rows(first, stop, table)
+        self._delayed[first:stop], self._direct[first:stop] = drive.rows(first, stop, table)
 
     @one_blas_thread()
     def forecast(
@@ -735,7 +742,9 @@ class Live:
             waves, means of inputs or mean surge of late lie outside the training, the errors are
             raised to those of late and by the square of the height; so are they where a plan goes
             farther than the input did in training. Where the consistency of a state exceeds two,
-            its errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
+            its errors are raised by it, and its lead time shrinks; but not above those of free runs
+            of late, or what the channel and its forecast depart from the mean of training by
+            (at least the SD there). ``attrs["validity"]`` names what
             lies outside (:class:`seakeep.models.validity.Validity`), beside the numbers and
             ``trained_`` ones;
             ``attrs["consistency"]`` is the larger one of each state, at least one.
@@ -773,16 +782,16 @@ class Live:
         )
         ((values, lost),) = engine.member_series(self.model, [windows])
         complete = values[lost.max(axis=1) < 0]
-        conditions, (late, free) = self.conditions, self.consistency_by_state
+        conditions, (late, free) = self.conditions, np.fmax(self.consistency_by_state, 1.0)
         validity, coverage = self._validity(conditions, closed), self.model.coverage
         plan = futures[0, len(closed.record) :]
         beyond = np.delete((plan < coverage.least) | (plan > coverage.most), self._waves, axis=1)
         if beyond.any():
             validity |= Validity.MEAN
-        worst = np.fmax(np.fmax(late, free), 1.0)
+        worst = np.maximum(late, free)
         wider = np.where(worst > ALARM, worst, 1.0)
         if conditions is not None and (conditions.validity or beyond.any()):
-            wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
+            wider = np.maximum(np.maximum(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
             # Errors of the model and of the estimate, never above those of the open loop.
@@ -795,9 +804,14 @@ class Live:
             table[0], spread, weight = weighed(complete, errors, scale, given, before)
             if unseen > leads:
                 table[0], weight = scale.centre, np.zeros_like(weight)
+            # Not above those of free runs of late, or what channel and forecast depart by.
+            usual = scale.spread**2
+            own = np.mean((self._x[self._kept] - scale.centre) ** 2, axis=0)
+            usual = np.minimum(wider * usual, np.maximum(usual, own))
+            most = np.maximum(free * errors, usual + (table[0] - scale.centre) ** 2)
             # The error passes over with the mean, to that of the mean of training.
-            variance = weight * (spread + wider * errors)
-            table[1] = np.sqrt(variance + (1.0 - weight) * wider * scale.spread**2)
+            variance = weight * (spread + np.minimum(wider * errors, most))
+            table[1] = np.sqrt(variance + (1.0 - weight) * usual)
             spread *= weight
             half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
@@ -909,6 +923,7 @@ class Live:
         # ones, again.
         first = max(self._pending - 1 - self.signature.input_delays, 0)
         parts += [rows[first : self._count.taken] for rows in (self._y, self._delayed)]
+        parts.append(self._of_late)
         parts += [each for update in self._updates if update for each in update]
         parts += [self._history, self._free, self._innovation, self._squares, self._jumps.memory]
         if self._count.since:  # or it is zero
