@@ -220,8 +220,8 @@ CHANGES = {
     "core/spectra.py": [
         ("[2] - 1j *", "[2] + 1j *", "check/test_response.py::test_intervals_of_a_harmonic_fit_cover_as_they_say"),
         ("part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)", "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
-        ('padtype="even"', 'padtype="odd"', "statistics/test_bands.py::test_waves_are_not_forced_to_nothing_at_the_ends"),
-        ("return low, x - low", "return low, x", "statistics/test_bands.py::test_the_parts_add_up_to_the_series"),
+        ('padtype="even"', 'padtype="odd"', "statistics/test_split_bands.py::test_waves_are_not_forced_to_nothing_at_the_ends"),
+        ("return low, x - low", "return low, x", "statistics/test_split_bands.py::test_the_parts_add_up_to_the_series"),
         ("1 + 2 * OVERLAP_CORRELATION * (count - 1) / count", "1 + 0 * count", "check/test_coherence.py::test_averages_and_the_interval_of_a_gain_are_those_of_repetitions"),
         ("both = self.input_power[:, :, None] * self.outputs[:, None]", "both = np.sqrt(self.input_power[:, :, None] * self.outputs[:, None])", "check/test_coherence.py::test_coherence_is_that_of_scipy"),
         ("both[0] + 2 * both[1:].sum(axis=0)", "both[0] + both[1:].sum(axis=0)", "check/test_residuals.py::test_limits_of_the_correlation_with_inputs_cover_as_they_say"),

@@ -9,7 +9,6 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.report.style import (
     COLOURS,
-    DASHED,
     LINES,
     MARKS,
     PALETTE,
@@ -27,8 +26,8 @@ from seakeep.report.style import (
 
 SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 POINTS = {"linestyle": "none", "elinewidth": 0.8}
-INPUTS = ("-", DASHED, ":") * 9
-"""Dashes of one input after the other."""
+INPUTS = ("-", ":", "-.") * 99
+"""Lines of one input after the other; dashes are those of a forecast."""
 
 
 def by_state(

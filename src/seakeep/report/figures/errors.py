@@ -371,7 +371,7 @@ def tuning_figure(table: xr.Dataset) -> Figure:
         markersize=11,
         fillstyle="none",
         color="k",
-        label=f"chosen: {names[np.argmax(table['chosen'].values)]}",
+        label=f"chosen: {names[table['chosen'].values.argmax()]}" if varied else "chosen",
     )
     axes.set(xlabel="ridge per snapshot pair [1]", ylabel="mean NRMSE of free runs [SD], 95 %")
     legend_outside(axes)
