@@ -1,6 +1,5 @@
 """Checks of time: clocks, rates and records of the loggers, the common step, the period."""
 
-from dataclasses import replace
 from statistics import median_high, median_low
 
 import numpy as np
@@ -56,7 +55,7 @@ class ClocksKind(Kind):
         "clock assumed the same as the reference's: state trigger, shared, correlated or offset (0 "
         "where the two run on one clock) in [instruments.{channel}]"
     )
-    UNCERTAIN_CLOCK = "clock poorly known: {described}"
+    UNCERTAIN_CLOCK = "clock poorly known: ± {value:.2g} s at the start of its record; {described}"
     CLOCK_DRIFT = "clock drifts by {value:+.0f} ppm"
     STARTS_LATE = (
         "starts at {value:.4g}, the other loggers at {limit:.4g}: the run is cut to what all "
@@ -117,9 +116,8 @@ def clocks(record: Record) -> Findings:
             yield record.finding(ClocksKind.ASSUMED_CLOCK, label)
         error, limit = clock.reading_error(float(group["time"][0])), 0.25 * step
         if error > limit or clock.residual > 0.5 * step:
-            described = replace(clock, offset_error=error).describe()
             yield record.finding(
-                ClocksKind.UNCERTAIN_CLOCK, label, error, limit, "s", described=described
+                ClocksKind.UNCERTAIN_CLOCK, label, error, limit, "s", described=clock.describe()
             )
         if abs(clock.drift) > LARGEST_DRIFT:
             drift, limit = 1e6 * clock.drift, 1e6 * LARGEST_DRIFT
