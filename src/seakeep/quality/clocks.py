@@ -55,7 +55,7 @@ class ClocksKind(Kind):
         "clock assumed the same as the reference's: state trigger, shared, correlated or offset (0 "
         "where the two run on one clock) in [instruments.{channel}]"
     )
-    UNCERTAIN_CLOCK = "clock poorly known: ± {value:.2g} s at the start of its record; {described}"
+    UNCERTAIN_CLOCK = "clock poorly known: ± {value:.2g} at the start of its record; {described}"
     CLOCK_DRIFT = "clock drifts by {value:+.0f} ppm"
     STARTS_LATE = (
         "starts at {value:.4g}, the other loggers at {limit:.4g}: the run is cut to what all "
