@@ -667,7 +667,7 @@ CHANGES = {
         ("step = 1 if drawn else max(width, 1)", "step = 1", "study/test_windows.py::test_training_windows_hold_the_largest_draw_with_its_history"),
         ("list(dict.fromkeys([*firsts.values(), *places]))[:count]", "places[:count]", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),
         ("shares |= {run: each.name for each in training for run in each.left_out}", "shares |= {}", "study/test_windows.py::test_each_group_that_is_left_out_has_a_window_and_windows_that_do_so_stay"),
-        ("zlib.crc32(purpose.encode())", "0", "study/test_windows.py::test_a_further_test_set_moves_no_window_of_another"),
+        ("zlib.crc32(purpose.encode())", "0", "study/test_windows.py::test_each_test_set_draws_from_a_stream_of_its_own"),
     ],
     "study/reproduce.py": [
         ("HIGH_PASS = 0.15", "HIGH_PASS = 0.25", "study/test_reproduce.py::test_the_edge_of_the_drift_lies_between_drift_and_waves"),

@@ -4,7 +4,7 @@ import numpy as np
 from records import record, rms
 from seas import Sea
 
-from seakeep import ProbeAlignment, SlowSquares
+from seakeep import Powers, ProbeAlignment, SlowSquares
 
 DT, DEPTH = 0.1, 3.6
 POSITIONS = {"eta_fwd": 48.42, "eta_cog": 52.09}
@@ -12,6 +12,7 @@ STATES, INPUTS = ["surge", "heave"], ["eta_fwd", "eta_cog"]
 LINE, LOAD_NOISE = -1.33, 0.5  # m from the last probe, N
 FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 SQUARES = SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
+OBSERVABLES = SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)), Powers(INPUTS)
 
 
 def drifting_run(seed=0, samples=1500, moved=0.0):

@@ -37,6 +37,10 @@ class Oscillator:
         return record(self.dt, attrs, heave=state[:, 0], heave_rate=state[:, 1], eta_fwd=force)
 
 
+OF_ARX = ["heave"], ["eta"]
+"""States and inputs of :func:`arx_run`."""
+
+
 def arx_run(seed, a, b, samples, period, noise=0.0):
     """Heave x(k + 1) = a · (x(k), x(k − 1), …) + b · (u(k), …) of a white wave u, by 0.1 s.
 

@@ -32,6 +32,13 @@ def arrays_at(model, run, start):
     return x[:now], u[:now], u[now:]
 
 
+def fed(live, inputs, states):
+    """A model in service, after these samples."""
+    for sample in zip(inputs, states, strict=True):
+        live.step(*sample)
+    return live
+
+
 def rms(values):
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

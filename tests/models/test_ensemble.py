@@ -7,7 +7,7 @@ import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from records import arrays_at, record, table
+from records import arrays_at, fed, record, table
 from said import data_error, warned
 from scipy import stats
 
@@ -54,9 +54,7 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     assert_allclose(table(centred.forecast_summary(unseen, 65.0, 120), STATES), wanted, **close)
     x, u, ahead = arrays_at(centred, unseen, 65.0)
     assert_allclose(centred.hold().forecast_arrays(x, u, ahead, 120)[:4], wanted, **close)
-    live = centred.live()
-    for sample in zip(u, x, strict=True):
-        live.step(*sample)
+    live = fed(centred.live(), u, x)
     mean, std, *_ = table(live.forecast(120, ahead), STATES)
     assert_allclose(mean, expected, **close)
     one_step = table(single.forecast(unseen, 64.6, 1), STATES)[0]

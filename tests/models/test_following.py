@@ -4,19 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import FOLLOWED, INPUTS, STATES, heave_error
+from drifting import FOLLOWED, INPUTS, OBSERVABLES, STATES, heave_error
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
-from seakeep import HankelDMDc, Powers, SlowSquares
+from seakeep import HankelDMDc
 from seakeep.core.recursion import Place, Recursion, recursion
 from seakeep.models.calibration import envelope_of
 from seakeep.models.labelled import Span
 
-OBSERVABLES = (
-    SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)),
-    Powers(("eta_fwd", "eta_cog")),
-)
 SPEC = HankelDMDc(
     10, 40, 1e-3, delay_rows="exact", alignment=FOLLOWED, lead=12, observables=OBSERVABLES
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from free_runs import held_out_scores
-from oscillators import arx_run
+from oscillators import OF_ARX, arx_run
 from squared import INPUTS, PERIOD, STATES, runs
 
 from seakeep import HankelDMDc, tune
@@ -55,11 +55,11 @@ def test_a_kind_that_is_better_beyond_the_noise_is_taken_by_tune():
     given = {f"run {seed}": arx_run(seed, [], b, 200, 0.4, 1.0) for seed in range(4)}
     # The waves tell all but the noise, which 41 delayed states in it learn by heart.
     spec = HankelDMDc(40, 3, 1e-5, delay_rows="exact", ridge_scale="per_snapshot")
-    result = tune(spec, given, ["heave"], ["eta"], vary=["kind"], horizon=(5,))
+    result = tune(spec, given, *OF_ARX, vary=["kind"], horizon=(5,))
     assert "kind = 'fir' errs 0." in result.note
     assert isinstance(result.settings, FIR)
     assert result.settings.input_delays == 3
-    model = result.settings.fit(given, ["heave"], ["eta"])
+    model = result.settings.fit(given, *OF_ARX)
     taps = model.B[0] * model.state_std / model.input_std
     # Of 4 runs of 200 samples in noise of SD 1.2: to 0.04 each.
     np.testing.assert_allclose(taps, [*b, 0.0], rtol=0, atol=0.12)
@@ -69,24 +69,24 @@ def test_recommended_names_a_subspace_model_where_noise_spoils_delayed_states():
     """A weakly damped motion with a third of noise: states regressed on it decay too fast."""
     given = damped(0.98, 0.3)
     spec = HankelDMDc(6, 6, "rollout", delay_rows="exact", ridge_scale="per_snapshot")
-    chosen = spec.settled(given, ["heave"], ["eta"])
+    chosen = spec.settled(given, *OF_ARX)
     assert "kind = 'subspace' errs 0." in chosen.note
     assert isinstance(chosen.settings, HankelDMDc)
     assert chosen.rival is None  # no host runs it
     # Runs that are shorter than its past and future stop nothing.
     short = {name: run.isel(time=slice(75)) for name, run in given.items()}
     few = replace(spec, state_delays=40, select={"horizon": 1.0})
-    assert "subspace" not in few.settled(short, ["heave"], ["eta"]).note
+    assert "subspace" not in few.settled(short, *OF_ARX).note
     # Nor does one, which is held out first.
     one = given | {"run 0": given["run 0"].isel(time=slice(25))}
     few = replace(spec, state_delays=12, input_delays=12, select={"horizon": 0.5})
-    assert "subspace" not in few.settled(one, ["heave"], ["eta"]).note
+    assert "subspace" not in few.settled(one, *OF_ARX).note
 
 
 def test_a_filter_is_taken_where_a_subspace_model_is_better_still():
     """A damped motion that 31 delayed inputs tell, in noise that spoils three delayed states."""
     spec = HankelDMDc(2, 30, "rollout", delay_rows="exact", ridge_scale="per_snapshot")
-    chosen = spec.settled(damped(0.6, 1.0), ["heave"], ["eta"])
+    chosen = spec.settled(damped(0.6, 1.0), *OF_ARX)
     assert "kind = 'subspace' errs 0." in chosen.note
     assert isinstance(chosen.rival, FIR)
 

@@ -9,7 +9,7 @@ from drifting import FOLLOWED, INPUTS, SQUARES, STATES
 from ensembles import few
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
-from records import record, rms, table
+from records import fed, record, rms, table
 from said import request_error
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -203,9 +203,8 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     )
 
     def after(push):
-        live, run = model.live(), sea(2, push)
-        for u, y in zip(run["eta_fwd"].values, table(run, ["sway", "heave"]), strict=True):
-            live.step([u], y)
+        run = sea(2, push)
+        live = fed(model.live(), table(run, ["eta_fwd"]), table(run, ["sway", "heave"]))
         return live, live.forecast(32, np.zeros((32, 1)))
 
     (sound, calm), (drifting, pushed) = after(0.0), after(0.7)
@@ -477,11 +476,9 @@ def test_forecasts_read_waves_whose_short_gaps_are_closed(
 def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift, waves, motions):
     """Also the one up-wave, for which what it was filled by is read again and again."""
     for dead in range(2):
-        live = started(models["aligned"], drift)
         lost = waves.copy()
         lost[:, dead] = np.nan
-        for sample, states in zip(lost[START:], motions[START:], strict=True):
-            live.step(sample, states)
+        live = fed(started(models["aligned"], drift), lost[START:], motions[START:])
         assert np.abs(live._known_inputs()[-200:, dead]).max() < np.abs(waves[:, dead]).max()
 
 
@@ -626,9 +623,8 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     run = made(3)
     live, constant = (model.live(roles={"thrust": role}) for role in ("known", "constant"))
     u, y = table(run, ["eta", "thrust"]), table(run, ["surge"])
-    for at in range(300):
-        live.step(u[at], y[at])
-        constant.step(u[at], y[at])
+    for each in (live, constant):
+        fed(each, u[:300], y[:300])
     for at in range(300, 320):
         live.step([np.nan, u[at, 1]], y[at])  # the probe is dead; the thrust is known
         assert live._known_inputs()[-1, 1] == u[at, 1]

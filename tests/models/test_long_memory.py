@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from oscillators import arx_run
+from oscillators import OF_ARX, arx_run
 from said import request_error
 
 from seakeep import HankelDMDc, Select, tune
@@ -21,7 +21,7 @@ def remembering(seed, samples=300):
 
 
 def test_a_sparse_memory_is_recovered():
-    model = SPEC.fit([remembering(1), remembering(2)], ["heave"], ["eta"])
+    model = SPEC.fit([remembering(1), remembering(2)], *OF_ARX)
     # Exact data: what is left is rounding times the condition number, below 1e3.
     assert_allclose([*model.A[0], *model.B[0]], [*WEIGHTS, 0.7], rtol=0, atol=1e-10)
     run = remembering(7)
@@ -43,11 +43,9 @@ def test_a_memory_is_recommended_where_the_vessel_has_one():
         2, 0, "rollout", delay_rows="exact", select=Select(memory=True, period=0.2, horizon=(20,))
     )
     assert spec.needs(0.1).history == 16
-    model = spec.fit(given, ["heave"], ["eta"])
+    model = spec.fit(given, *OF_ARX)
     assert (model.settings.memory, model.settings.state_delays) == (16, 2)
     assert "memory 16  (chosen)" in model.selection
-    tuned = tune(
-        replace(spec, select=None), given, ["heave"], ["eta"], vary=["memory"], horizon=[20.0]
-    )
+    tuned = tune(replace(spec, select=None), given, *OF_ARX, vary=["memory"], horizon=[20.0])
     # Of the same windows, and without a period of its own.
     assert tuned.settings.memory == round(8 * 0.2 / 0.1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
-from oscillators import arx_run
+from oscillators import OF_ARX, arx_run
 from records import arrays_at, rms
 from said import data_error, request_error, warned
 
@@ -18,7 +18,6 @@ from seakeep.models.engine import read_groups
 ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
 """Of x(k) and x(k − 1): at a draught of zero, and their change per unit."""
 ON_WAVE = 0.5, 0.4
-CHANNELS = ["heave"], ["eta"]
 SPEC = HankelDMDc(1, 0, 0.0, standardize=False, delay_rows="exact", parameter="rig.draught")
 CHOSEN = HankelDMDc(
     2, 1, "rollout", delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
@@ -49,7 +48,7 @@ def error(model):
 
 @pytest.fixture(scope="module")
 def model():
-    return SPEC.fit(vessels((0.0, 0.4, 1.0), 10), *CHANNELS)
+    return SPEC.fit(vessels((0.0, 0.4, 1.0), 10), *OF_ARX)
 
 
 def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
@@ -86,33 +85,33 @@ def test_means_follow_the_parameter():
     runs = vessels((0.0, 0.5, 1.0), 20, 4000, 0.01)
     for run in runs:
         run["heave"].values[:] += 3.0 * run.attrs["rig"]["draught"]
-    mean = spec.fit(runs, *CHANNELS).at(parameter=0.75).state_mean[0]
+    mean = spec.fit(runs, *OF_ARX).at(parameter=0.75).state_mean[0]
     # The mean of 4,000 samples of a heave of SD 2 to 6 is known to about a tenth.
     assert mean == pytest.approx(2.25, abs=0.3)
 
 
 def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
-    varying = CHOSEN.fit(family, *CHANNELS)
+    varying = CHOSEN.fit(family, *OF_ARX)
     assert varying.settings.parameter == "rig.draught"
     fixed = replace(CHOSEN, parameter="")
-    pooled, nearest = (fixed.fit(runs, *CHANNELS) for runs in (family, family[1]))
+    pooled, nearest = (fixed.fit(runs, *OF_ARX) for runs in (family, family[1]))
     assert error(varying) < 0.5 * min(error(pooled), error(nearest))
     alike = [
         same.assign_attrs(rig=run.attrs["rig"])
         for same, run in zip(vessels([0.5] * 4, 50, 800, 0.05), family, strict=True)
     ]
-    same = CHOSEN.fit(alike, *CHANNELS)
+    same = CHOSEN.fit(alike, *OF_ARX)
     assert same.settings.parameter == ""
     assert "a pooled one" in same.selection
-    assert tune(CHOSEN, alike, *CHANNELS).settings.parameter == ""
+    assert tune(CHOSEN, alike, *OF_ARX).settings.parameter == ""
 
 
 def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started(family):
     start = replace(CHOSEN, ridge=1e-6)
-    result = tune(start, family, *CHANNELS, vary=["state_delays"])
+    result = tune(start, family, *OF_ARX, vary=["state_delays"])
     assert result.settings.parameter == "rig.draught"
     assert result.note.startswith("on runs of inner values that are held out, a model that varies")
-    before, after = (error(spec.fit(family, *CHANNELS)) for spec in (start, result.settings))
+    before, after = (error(spec.fit(family, *OF_ARX)) for spec in (start, result.settings))
     assert after < 1.01 * before
 
 
@@ -126,7 +125,7 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, family, monkeypat
     largest = specs.largest_radius
     monkeypatch.setattr(specs, "largest_radius", lambda m: 1.0 if m.variation else largest(m))
     spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
-    assert spec.fit(family, *CHANNELS).settings.parameter == ""
+    assert spec.fit(family, *OF_ARX).settings.parameter == ""
 
 
 def test_a_check_takes_the_middle_of_the_training(model):
@@ -151,6 +150,6 @@ def test_words(model):
     with request_error("does not vary with a parameter"):
         model.at(parameter=0.5).at(parameter=0.5)
     with data_error(r"all runs have rig\.draught = 0\.7"):
-        SPEC.fit([run, vessel(0.7, 4)], *CHANNELS)
+        SPEC.fit([run, vessel(0.7, 4)], *OF_ARX)
     with request_error("parameter takes delay_rows = 'exact'"):
         replace(SPEC, delay_rows="ridge")

@@ -10,7 +10,7 @@ from drifting import STATES as DRIFTING
 from drifting import drifting_run
 from free_runs import held_out_scores
 from numpy.testing import assert_allclose, assert_array_equal
-from oscillators import arx_run
+from oscillators import OF_ARX, arx_run
 from records import record
 from said import data_error
 from squared import DT, INPUTS, STATES, runs
@@ -181,12 +181,12 @@ def test_what_grows_is_never_chosen():
     """A motion that grows by half a per cent a step: the truth has no stable model."""
     given = {f"run{seed}": arx_run(seed, [1.005], [0.5], 120, 1.0) for seed in range(3)}
     spec = HankelDMDc(2, 2, "rollout", delay_rows="exact")
-    found = select(spec, given, ["heave"], ["eta"], horizon=(1.0,))
+    found = select(spec, given, *OF_ARX, horizon=(1.0,))
     ranked = sorted(found.rows, key=lambda row: row["score"])
     stable = []
     for row in ranked:
         settings = replace(spec, ridge=row["ridge"], ridge_scale="per_snapshot")
-        model = settings.fit(given, ["heave"], ["eta"])
+        model = settings.fit(given, *OF_ARX)
         stable.append(bool(np.abs(np.linalg.eigvals(model.A)).max() < 1))
     assert not stable[0]  # over ten steps the truth itself is best
     assert found.settings.ridge == ranked[stable.index(True)]["ridge"]

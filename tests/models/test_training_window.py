@@ -39,21 +39,6 @@ def test_a_rank_takes_the_place_of_ridge(run, channels):
         HankelDMDc(3, 8, 2.0, rank=5)
 
 
-def test_the_paper_preset_has_the_papers_numbers():
-    assert HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32) == HankelDMDc(
-        32,
-        160,
-        100.0,
-        window=640,
-        history="before",
-        delay_rows="ridge",
-        ridge_scale="absolute",
-        rank=None,
-        standardize=True,
-        alignment=None,
-    )
-
-
 def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
     assert HankelDMDc.recommended(encounter_period=1.64, dt=1.64 / 32) == HankelDMDc(
         *(32, 96, "rollout"),

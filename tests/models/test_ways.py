@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, FOLLOWED, INPUTS, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, OBSERVABLES, drifting_run
 from numpy.testing import assert_allclose
-from records import arrays_at, table
+from records import arrays_at, fed, table
 from said import data_error
 from xarray.testing import assert_identical
 
@@ -15,15 +15,12 @@ from seakeep import (
     BayesianHankelDMDc,
     HankelDMDc,
     LogUniform,
-    Powers,
     ProbeAlignment,
-    SlowSquares,
     Uniform,
     load_model,
 )
 
 STATES, START, STEPS = ["surge", "heave", "mooring_bow"], 600, 80
-OBSERVABLES = (SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)), Powers("eta_fwd"))
 VARIANTS = {
     "regressed rows": {"delay_rows": "ridge"},
     "absolute ridge, history inside": {"ridge_scale": "absolute", "history": "inside"},
@@ -93,10 +90,7 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     x, u, ahead = arrays_at(model, run, START * DT)
     assert_allclose(model.forecast_arrays(x, u, ahead, STEPS), table(expected, STATES), **close)
     if not carried:
-        live = model.live(like=run)
-        for sample in zip(u, x, strict=True):
-            live.step(*sample)
-        served = live.forecast(STEPS, ahead).isel(statistic=0)
+        served = fed(model.live(like=run), u, x).forecast(STEPS, ahead).isel(statistic=0)
         assert_allclose(table(served, STATES), table(expected, STATES), **close)
 
 

@@ -2,17 +2,18 @@
 
 import dataclasses
 import json
-import re
 from math import tau
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.random import default_rng
+from oscillators import arx_run
 from said import request_error, warned
 from scipy import signal
 from seas import sea
 from small_tank import write_csv
+from tutorial_study import edit
 
 import seakeep
 from seakeep import SeakeepWarning
@@ -22,17 +23,22 @@ from seakeep.study import compare, comparison_table, fit_campaign
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*shows waves of")  # of unit size
 
-RATE = 10.0
+TIME = np.arange(2001) / 10.0
+
+
+def written(folder, name, eta, heave, role="train"):
+    """Write a run from the start of `TIME` on; what a campaign file says of it."""
+    columns = {"t [s]": TIME[: len(eta)], "eta [m]": eta, "z [m]": heave}
+    path = write_csv(folder / f"{name}.csv", columns)
+    return f'[runs.{name}]\nfile = "{path.name}"\nrole = "{role}"\n'
 
 
 @pytest.fixture
 def halves(tmp_path):
     """One run of 200 s: its first half trains, its second tests."""
-    rng = default_rng(4)
-    time = np.arange(2001) / RATE
-    eta = np.sin(tau * 0.5 * time + np.sin(time / 9)) + 0.1 * rng.standard_normal(time.size)
-    heave = signal.lfilter([0.0, 0.1], [1.0, -1.7, 0.8], eta)
-    write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": heave})
+    noise = 0.1 * default_rng(4).standard_normal(TIME.size)
+    eta = np.sin(tau * 0.5 * TIME + np.sin(TIME / 9)) + noise
+    written(tmp_path, "run", eta, signal.lfilter([0.0, 0.1], [1.0, -1.7, 0.8], eta))
     return tmp_path
 
 
@@ -91,14 +97,12 @@ def test_a_state_that_was_not_measured_is_named(halves):
 def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
     whole = campaign(halves, EXACT)
     model = fit_campaign(whole)
-    (halves / "campaign.toml").write_text(whole.path.read_text().replace("eta_fwd", "eta_1"))
-    other = seakeep.read_campaign(halves / "campaign.toml")
+    other = seakeep.read_campaign(edit(whole.path, ("eta_fwd", "eta_1")))
     with request_error(r"no channel 'eta_fwd'\. Did you mean 'eta_1'"):
         compare(model, other)
-    text = re.sub(r"inputs = .*", "inputs = []", whole.path.read_text())
-    (halves / "campaign.toml").write_text(text)
+    undriven = edit(whole.path, ('inputs = ["eta_1"]', "inputs = []"))
     with warned("the model has no inputs: .* no waves drive"):
-        fit_campaign(seakeep.read_campaign(halves / "campaign.toml"))
+        fit_campaign(seakeep.read_campaign(undriven))
 
 
 @pytest.mark.filterwarnings("ignore:.*is noise")
@@ -106,14 +110,11 @@ def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
     ("stated", "taken"), [("", "fir"), ('kind = "hankel_dmdc"\n', "hankel_dmdc")]
 )
 def test_a_filter_that_errs_less_is_taken_where_the_kind_is_left_open(tmp_path, stated, taken):
-    rng = default_rng(0)
-    runs = ""
-    for name in "abcd":  # the waves tell all but the noise, which 41 delayed states learn by heart
-        eta, noise = rng.standard_normal((2, 200))
-        heave = np.convolve(eta, [0.0, 1.0, -0.5, 0.3])[:200] + noise
-        table = {"t [s]": np.arange(200) / RATE, "eta [m]": eta, "z [m]": heave}
-        write_csv(tmp_path / f"{name}.csv", table)
-        runs += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "train"\n'
+    text = "[campaign]\nencounter_period = 0.4\n"
+    for seed, name in enumerate("abcd"):
+        # The waves tell all but the noise, which 41 delayed states learn by heart.
+        run = arx_run(seed, [], [1.0, -0.5, 0.3], 200, 0.4, 1.0)
+        text += written(tmp_path, name, run["eta"], run["heave"])
     model = """state_delays = 40
 input_delays = 3
 ridge = "rollout"
@@ -121,7 +122,7 @@ ridge_scale = "per_snapshot"
 delay_rows = "exact"
 select = { horizon = 5, memory = true }
 """
-    whole = campaign(tmp_path, stated + model, "[campaign]\nencounter_period = 0.4\n" + runs)
+    whole = campaign(tmp_path, stated + model, text)
     fitted = fit_campaign(whole)
     assert fitted.settings.kind == taken
     assert "kind = 'fir' errs 0." in fitted.summary()
@@ -162,9 +163,8 @@ REPEATS = (
 
 def test_a_test_that_repeats_its_training_is_warned_of(tmp_path):
     """A sea of equally spaced components comes back, turned, after 100 s of 200."""
-    time = np.arange(2001) / RATE
-    eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(time)
-    write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": np.roll(eta, 5)})
+    eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(TIME)
+    written(tmp_path, "run", eta, np.roll(eta, 5))
     whole = campaign(tmp_path, EXACT)
     with warned(REPEATS):
         model = fit_campaign(whole)
@@ -178,12 +178,12 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     table.to_csv(halves / "run.csv", index=False)
     # A probe downstream: its waves are carried upstream, to where they were before.
     aligned = EXACT + '\nalignment = { mode = "dispersion", surge = "measured", offset = -0.3 }'
-    text = campaign(halves, aligned).path.read_text()
-    (halves / "campaign.toml").write_text(
-        '[rig]\nwater_depth = 3.6\npositions = { eta_fwd = 1.0 }\n[channels.surge]\ncolumn = "x"\n'
-        + text.replace("test = [100.0, 200.0]", "test = [100.0, 200.0]\nprobe_offset = 0.1")
+    rig = "[rig]\nwater_depth = 3.6\npositions = { eta_fwd = 1.0 }\n"
+    path = edit(
+        campaign(halves, aligned).path,
+        ("[runs.all]", f'{rig}[channels.surge]\ncolumn = "x"\n[runs.all]\nprobe_offset = 0.1'),
     )
-    whole = seakeep.read_campaign(halves / "campaign.toml")
+    whole = seakeep.read_campaign(path)
     with warned(r"up to 1\.14 s after the instant"):
         model = fit_campaign(whole)
     expected = seakeep.ProbeAlignment(mode="dispersion", surge="measured", offset=-0.3)
@@ -194,17 +194,10 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     assert found["probe_offset"] == 0.1
 
 
-def sines(folder, periods):
-    """Runs of regular waves, one file each; the last one tests."""
-    time = np.arange(1501) / RATE
-    text = ""
-    for number, (name, each) in enumerate(periods.items()):
-        eta = sum(np.sin(tau * time / period) for period in each)
-        columns = {"t [s]": time, "eta [m]": eta, "z [m]": 0.5 * np.roll(eta, 2)}
-        write_csv(folder / f"{name}.csv", columns)
-        role = "test" if number == len(periods) - 1 else "train"
-        text += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "{role}"\n'
-    return text
+def sines(*periods):
+    """Regular waves, one upon the other, and the heave that they make."""
+    eta = sum(np.sin(tau * TIME[:1501] / period) for period in periods)
+    return eta, 0.5 * np.roll(eta, 2)
 
 
 @pytest.mark.parametrize(
@@ -216,8 +209,10 @@ def sines(folder, periods):
     ],
 )
 def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, words):
-    runs = sines(tmp_path, {"shorter": (0.5,), "short": (1.0,), "long": (4.0,), "new": (period,)})
-    asked = campaign(tmp_path, EXACT, runs)
+    text = written(tmp_path, "new", *sines(period), role="test")
+    for name, each in {"shorter": 0.5, "short": 1.0, "long": 4.0}.items():
+        text += written(tmp_path, name, *sines(each))
+    asked = campaign(tmp_path, EXACT, text)
     model = fit_campaign(asked)
     with warned(rf"new: eta_fwd: .* of {words}.*Train in such"):
         compare(model, asked)
@@ -227,14 +222,12 @@ def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, 
 
 
 def test_a_run_that_disagrees_with_the_others_is_warned_of(tmp_path):
-    sines(tmp_path, dict.fromkeys("abc", (0.7, 0.83, 0.97, 1.13, 1.37, 1.61)))
+    eta, heave = sines(0.7, 0.83, 0.97, 1.13, 1.37, 1.61)
     text, rng = "", default_rng(0)
     for name, factor in {"a": 1.0, "b": 1.0, "c": 1.8}.items():
-        table = pd.read_csv(tmp_path / f"{name}.csv")
         # Without noise the last state alone tells the next one, and its scale.
-        table["z [m]"] = factor * table["z [m]"] + 0.1 * rng.standard_normal(len(table))
-        table.to_csv(tmp_path / f"{name}.csv", index=False)
-        text += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "train"\n'
+        noise = 0.1 * rng.standard_normal(eta.size)
+        text += written(tmp_path, name, eta, factor * heave + noise)
     with warned(r"c disagrees .*; heave moves 1\.(79|8) times as much"):
         fit_campaign(campaign(tmp_path, EXACT, text))
 
