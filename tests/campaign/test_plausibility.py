@@ -91,15 +91,13 @@ def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared
 
 
 def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
-    campaign = loggers()
-    text = campaign.path.read_text("utf-8")
+    copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
+    path = edit(loggers().path, ("[preparation]", copied))
     write_csv(
         tmp_path / "probes_2.csv", {n: tank_columns(1)[n] for n in ("Time [s]", "WP fwd [mm]")}
     )
-    copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
-    campaign.path.write_text(text.replace("[preparation]", copied), "utf-8")
     with warned("^second: file is one of first too"):
-        assert "file" in kinds(read_campaign(campaign.path).prepare()["second"])
+        assert "file" in kinds(read_campaign(path).prepare()["second"])
 
 
 # What is assumed or contradicted about instants is a finding.
