@@ -132,10 +132,9 @@ def test_a_rate_against_the_times(first, files, text):
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:.*shows waves of")  # at a step of 1 s they are too low
 def test_times_that_may_count_samples(first, tank, header, files, is_said):
-    for number, name in enumerate(("first", "second")):
-        columns = tank_columns(number)
-        del columns["Time [s]"]
-        write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
+    columns = tank_columns()
+    del columns["Time [s]"]
+    write_csv(tank / "first.csv", {header: np.arange(1001.0)} | columns)
     stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
     expected = warned(r"state sampling_rate \(Hz\) in \[files\]")
     with expected if is_said else nullcontext():
