@@ -2,11 +2,11 @@
 
 import re
 
-import numpy as np
 import pytest
+import two_loggers
 from said import data_error, findings, warned
-from seas import sea
 from small_tank import DT, tank_columns, write_csv
+from tutorial_study import edit
 
 from seakeep import DataError, RequestError
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
@@ -78,48 +78,21 @@ def test_every_bad_file_is_named(changed, tank):
         campaign.encounter_period()
 
 
-LOGGERS = """
-[channels.heave]
-unit = "m"
-[channels.load]
-unit = "N"
-[instruments]
-reference = "mru"
-[instruments.mru]
-[instruments.loads]
-shared = ["wave", "wave"]
-[preparation]
-sampling_rate = 10
-"""
-
-
-def two_loggers(folder, seed):
-    """A run of two loggers that both recorded the wave; the second's clock gains 400 ppm."""
-    wave = sea(seed, (0.3, 1.2), components=20).at
-    t = 0.02 * np.arange(3000)
-    write_csv(folder / f"mru_{seed}.csv", {"time": t, "wave": wave(t), "heave": wave(t)})
-    own = 0.01 * np.arange(5900)
-    true = (own + 0.3) * (1 - 4e-4)
-    write_csv(folder / f"loads_{seed}.csv", {"time": own, "wave": wave(true), "load": wave(true)})
-    return (
-        f'[runs.r{seed}.files]\nmru = "mru_{seed}.csv"\nloads = "loads_{seed}.csv"\n'
-        f'[runs.r{seed}]\nrole = "train"\n'
-    )
-
-
 def test_pooled_drifts(tmp_path):
-    runs = "".join(two_loggers(tmp_path, seed) for seed in range(3))
-    path = tmp_path / "campaign.toml"
-    path.write_text(LOGGERS + runs)
+    path = edit(two_loggers.write(tmp_path), ("water_depth = 3.0", ""))  # places no probes
+    for seed, name in enumerate(("two", "three"), 2):
+        two_loggers.write_raw(tmp_path, name, seed)
+        of_run = f"[runs.{name}.files]\nprobes = '{name}_probes.csv'\nmru = '{name}_mru.csv'\n"
+        edit(path, ("[preparation]", f"{of_run}[preparation]"))
     campaign = read_campaign(path)
-    whole = campaign.clocks()["r0"]["loads"]
-    (tmp_path / "loads_2.csv").write_text("time,wave,load\n0.0,1.0\n")
-    with warned(r"run 'r2' is left out of the pooled clock drifts: .*loads_2\.csv"):
-        left = campaign.clocks(["r0"])["r0"]["loads"]
+    whole = campaign.clocks()["one"]["mru"]
+    (tmp_path / "three_mru.csv").write_text("t [s],heave\n0.0\n")
+    with warned(r"run 'three' is left out of the pooled clock drifts: .*three_mru\.csv"):
+        left = campaign.clocks(["one"])["one"]["mru"]
     assert "drift of 3 runs" in whole.describe()
     assert "drift of 2 runs" in left.describe()
-    with warned("'r2' is left out"):
-        run = campaign.prepare(["r0"])["r0"]
-    assert "run 'r2' is left out of the pooled clock drifts" in run.attrs["quality"]
-    with data_error(r"loads_2\.csv"):
+    with warned("'three' is left out"):
+        run = campaign.prepare(["one"])["one"]
+    assert "run 'three' is left out of the pooled clock drifts" in run.attrs["quality"]
+    with data_error(r"three_mru\.csv"):
         campaign.clocks()

@@ -91,15 +91,13 @@ def test_runs_that_use_the_same_part_of_equal_files(changed, tank, spans, shared
 
 
 def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
-    campaign = loggers()
-    text = campaign.path.read_text("utf-8")
+    copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
+    path = edit(loggers().path, ("[preparation]", copied))
     write_csv(
         tmp_path / "probes_2.csv", {n: tank_columns(1)[n] for n in ("Time [s]", "WP fwd [mm]")}
     )
-    copied = '[runs.second]\nfiles = { probes = "probes_2.csv", mru = "mru.csv" }\n\n[preparation]'
-    campaign.path.write_text(text.replace("[preparation]", copied), "utf-8")
     with warned("^second: file is one of first too"):
-        assert "file" in kinds(read_campaign(campaign.path).prepare()["second"])
+        assert "file" in kinds(read_campaign(path).prepare()["second"])
 
 
 # What is assumed or contradicted about instants is a finding.
@@ -134,10 +132,9 @@ def test_a_rate_against_the_times(first, files, text):
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:.*shows waves of")  # at a step of 1 s they are too low
 def test_times_that_may_count_samples(first, tank, header, files, is_said):
-    for number, name in enumerate(("first", "second")):
-        columns = tank_columns(number)
-        del columns["Time [s]"]
-        write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
+    columns = tank_columns()
+    del columns["Time [s]"]
+    write_csv(tank / "first.csv", {header: np.arange(1001.0)} | columns)
     stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
     expected = warned(r"state sampling_rate \(Hz\) in \[files\]")
     with expected if is_said else nullcontext():

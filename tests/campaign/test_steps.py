@@ -322,9 +322,8 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
     if way == "shared":  # the channels fall together once the clock is turned back
         pair = run[["draught", "heave"]].isel(time=slice(100, -100))
         assert np.corrcoef(pair["draught"], pair["heave"])[0, 1] > 0.999
-    seconds, period = "window = 24\nlargest_lag = 6\n", "[campaign]\nencounter_period = 3\n"
-    text = path.read_text().replace("[preparation]", f"{seconds}[preparation]")
-    path.write_text(period + text)
+    stated = "window = 24\nlargest_lag = 6\n[campaign]\nencounter_period = 3\n[preparation]"
+    edit(path, ("[preparation]", stated))
     expected = read_campaign(path).clocks()["r"]["camera"]
     edit(path, ("window = 24", "window = '8 T'"), ("largest_lag = 6", "largest_lag = '2 T'"))
     assert read_campaign(path).clocks()["r"]["camera"] == expected

@@ -50,9 +50,9 @@ def checked(model, runs, baselines):
 
 
 def test_a_decay_in_still_water_is_no_test_in_irregular_waves(model, runs):
-    decay = part(5, waves="still", test_span=(0.0, 69.9))
-    assert [*worth(model, runs | {"decay": decay})["run"].values] == ["one", "two"]
-    assert [*validity(model, runs | {"decay": decay})["run"].values] == [*runs]
+    both = runs | {"decay": part(5, waves="still", test_span=(0.0, 69.9))}
+    assert [*worth(model, both)["run"].values] == ["one", "two"]
+    assert [*validity(model, both)["run"].values] == [*runs]
 
 
 def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs, checked):

@@ -18,17 +18,20 @@ TIGHT = 1e-12
 # The house rule for results; the condition number here is below 1e4.
 RESULT = 1e-10
 
+GENERATORS = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+FEW, DELAYS = st.integers(0, 3), st.integers(0, 6)
+
 
 @st.composite
 def problems(draw):
     """Runs, windows and delays: one to three runs, Q, D, s and z down to zero."""
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    N, Q, D = draw(st.integers(1, 3)), draw(st.integers(0, 3)), draw(st.integers(0, 3))
-    s, z = draw(st.integers(0, 6)), draw(st.integers(0, 6))
+    rng = draw(GENERATORS)
+    N, Q, D = draw(st.integers(1, 3)), draw(FEW), draw(FEW)
+    s, z = draw(DELAYS), draw(DELAYS)
     runs = []
     for _ in range(draw(st.integers(1, 3))):
         count = draw(st.integers(1, 40))
-        before, after = draw(st.integers(0, 3)), draw(st.integers(0, 3))
+        before, after = draw(FEW), draw(FEW)
         first = max(s, z) + before
         length = first + count + 1 + after
         x, u, d = (rng.normal(size=(length, width)) for width in (N, Q, D))
@@ -80,11 +83,11 @@ def stepwise(a, b, state, inputs, delays, direct, count):
 
 @st.composite
 def free_runs(draw):
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    N, Q = draw(st.integers(1, 4)), draw(st.integers(0, 3))
-    s, z = draw(st.integers(0, 5)), draw(st.integers(0, 5))
+    rng = draw(GENERATORS)
+    N, Q = draw(st.integers(1, 4)), draw(FEW)
+    s, z = draw(DELAYS), draw(DELAYS)
     windows, steps = draw(st.integers(1, 4)), draw(st.integers(1, 90))
-    size, D = N * (s + 1), draw(st.integers(0, 3))
+    size, D = N * (s + 1), draw(FEW)
     shifts = draw(st.booleans())
     a = rng.normal(size=(size, size)) / (2 * size)
     b = rng.normal(size=(size, Q * (z + 1) + D))

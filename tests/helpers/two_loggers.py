@@ -138,7 +138,7 @@ inputs = ["eta_fwd"]
 """
 
 
-def _write_raw(folder, run, seed):
+def write_raw(folder, run, seed):
     waves, rng = sea(seed, (0.4, 0.9), components=12).at, np.random.default_rng(seed)
 
     def noisy(t, size, lag):
@@ -157,5 +157,5 @@ def write(folder):
     """Write settings and raw files into a folder; gives the campaign file."""
     path = folder / "campaign.toml"
     path.write_text(CAMPAIGN, "utf-8")
-    _write_raw(folder, "one", 1)
+    write_raw(folder, "one", 1)
     return path

@@ -155,7 +155,6 @@ def test_a_model_that_is_let_go_swings_back():
     """Most of its record is rest, beside which the first swings are further than 20 SD."""
     swings = np.exp(-0.5 * T) * np.cos(5 * T)
     decay = swings + 1e-4 * default_rng(0).standard_normal(T.size)
-    assert np.abs(decay).max() > 40 * (np.percentile(decay, 95) - np.percentile(decay, 5)) / 3.29
     assert not find_outliers(decay).any()
     decay[300:340] += np.clip(np.arange(40) / 3, 0, 1)  # a reading that comes within three samples
     assert find_outliers(decay)[302:340].all()

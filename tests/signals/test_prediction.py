@@ -1,7 +1,5 @@
 """Waves continued by linear prediction."""
 
-from math import tau
-
 import numpy as np
 import pytest
 import seas
@@ -131,16 +129,14 @@ def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
 
 
 def test_departures_of_a_sea_are_the_errors_of_its_prediction():
-    rng, trials = default_rng(0), 300
-    omega = tau * rng.uniform(0.4, 0.9, (trials, 60, 1))
-    phase = rng.uniform(0, tau, omega.shape)
-    seas = np.cos(omega * 0.1 * np.arange(460) + phase).sum(axis=1).T
-    seas += 0.05 * seas.std() * rng.standard_normal(seas.shape)
-    found = foresee(seas[:400], 60, dt=0.1, positions=[np.nan] * trials, depth=3.6)
+    rng, trials, time = default_rng(0), 300, 0.1 * np.arange(460)
+    parts = [seas.sea(k, (0.4, 0.9), components=60).at(time) for k in range(trials)]
+    record = np.transpose(parts) + 0.05 * rng.standard_normal((460, trials))
+    found = foresee(record[:400], 60, dt=0.1, positions=[np.nan] * trials, depth=3.6)
     own = found.departures[np.arange(trials), :, np.arange(trials)]
     others = found.departures.sum(axis=0) - own.T
     assert not others.any()
-    ratio = (seas[400:] - found.expected).T / np.sqrt(np.cumsum(own**2, axis=1))
+    ratio = (record[400:] - found.expected).T / np.sqrt(np.cumsum(own**2, axis=1))
     # These seas tell the root to 2 %. Errors of 62 coefficients in 400 samples count as those of
     # one step do, to first order; without them the root is 15 % larger.
     assert rms(ratio) == pytest.approx(1.0, rel=0.1)
