@@ -11,7 +11,7 @@ from records import record
 from said import warned
 from seas import sea
 
-from seakeep.quality import Finding, Record, as_json, findings_of, warn_of
+from seakeep.quality import Finding, Record, as_json, check, findings_of, warn_of
 from seakeep.quality.clocks import clocks
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
@@ -62,6 +62,11 @@ def test_a_clock_is_as_uncertain_as_at_the_start_of_its_record(hours, level, tol
         assert found[0].value == pytest.approx(level, rel=1e-3)  # 60 s of drift add little
         assert found[0].text.startswith("clock poorly known: ± 0.012 s at the start of its record; +300")
     assert len(found) == told
+
+
+def test_a_record_of_one_logger_needs_no_clock():
+    run = record(DT, heave=waves())
+    assert check(Record("r", run, {"": run})) == []
 
 
 def test_a_phase_that_drifts_about_zero():

@@ -249,8 +249,8 @@ def prepare(
         Option(
             "-o",
             "--out",
-            help="Folder; by default 'prepared' beside the campaign, the only folder that fit, "
-            "forecast and compare read.",
+            help="Folder; by default 'prepared' beside the campaign, the only folder that other "
+            "commands read.",
         ),
     ] = None,
     anew: Annotated[
@@ -267,8 +267,8 @@ def prepare(
     Each run is written when it is finished: after an interruption, the same command continues.
     A run that cannot be read is reported at the end, with exit status 1.
 
-    fit, forecast and compare use these files while settings and raw files are unchanged, and
-    prepare missing runs in memory.
+    The other commands use these files while settings and raw files are unchanged, and prepare
+    missing runs in memory.
 
     Example: seakeep prepare docs/tutorial/campaign.toml
     """
@@ -291,8 +291,8 @@ def prepare(
         _report_runs(read, files, failures, sheet)
     if folder.resolve() != prepared_folder(read).resolve():
         say(
-            f"Note: fit, forecast and compare look for prepared runs in {prepared_folder(read)} "
-            f"alone, and prepare anew what is not there. Those in {out} are for load_prepared.",
+            f"Note: other commands look for prepared runs in {prepared_folder(read)} alone, and "
+            f"prepare anew what is not there. Those in {out} are for load_prepared.",
             style="yellow",
         )
     if failures:

@@ -1,4 +1,4 @@
-r"""Observables of a wave: slow parts of squares, and powers, as columns of a regression.
+r"""Observables of a wave: derivatives and slow parts of their squares, for columns of a regression.
 
 Slow drift and line loads go with the square of the wave, which no linear map of the elevation can
 make. The slow parts of the squares of the elevation and of its derivatives weigh the drift force

@@ -441,6 +441,7 @@ def _position(run: xr.Dataset, channel: str) -> float | None:
 
 
 def _common_depth(runs: Datasets) -> float | None:
+    """Water depth of the first run that states one, taken for all."""
     stated = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
     return float(stated[0]) if stated else None
 

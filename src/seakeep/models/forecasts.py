@@ -1,4 +1,7 @@
-"""Forecasts: names, units, status, statistics of members, weight; the door for arrays."""
+"""What a model is (Model, Spec), and its forecasts.
+
+Their names, units, status, statistics of members and weight; the door for arrays.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor

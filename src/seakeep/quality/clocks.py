@@ -7,6 +7,7 @@ import numpy as np
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Findings, Kind, Record, sound, step_of
+from seakeep.signals import Clock
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.time_axis import ASSUMED
 from seakeep.signals.waves import energy_above
@@ -100,7 +101,7 @@ class ClocksKind(Kind):
 def clocks(record: Record) -> Findings:
     """Gaps, jitter, rates that differ from the stated one, clocks that are not certain."""
     for name, group in record.groups.items():
-        label, clock, step = name or "time", record.clocks[name], step_of(group)
+        label, clock, step = name or "time", record.clocks.get(name, Clock()), step_of(group)
         if gaps := group.attrs.get("time_gaps"):
             missing = group.attrs["time_missing"]
             yield record.finding(ClocksKind.TIME_GAPS, label, gaps=gaps, missing=missing)

@@ -24,6 +24,8 @@ from seakeep.signals.time_axis import over_gaps
 class Kind(Enum):
     """Base of the kinds of findings; a member holds its sentence and its remedy.
 
+    Names of members are unique over all kinds, since prepared runs store findings by them.
+
     A sentence is a format string over the fields of :class:`Finding` and its details; `value` and
     `limit` come with their unit, angles in degrees. Kinds with a remedy are those that make a run
     another one than the campaign says: `prepare` warns of them, of those that come `together` in
@@ -189,9 +191,9 @@ class Record:
         All channels on one axis, in SI units, with ``NAME_flags``.
     groups : mapping of str to Dataset, optional
         Channels by logger, each at its own rate on the reference's time; "" where one file holds
-        all.
+        all. :meth:`recorded` yields their channels: nothing without groups.
     clocks : mapping of str to Clock, optional
-        Clock of each logger of `groups`.
+        Clocks of loggers of `groups`; the others run on the reference's.
     span : (float, float), optional
         The part that is used, s.
     waves : str, optional

@@ -17,7 +17,7 @@ from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import conditional, divergence_table
-from seakeep.report.style import HEADING, model_words
+from seakeep.report.style import model_words
 from seakeep.report.tables import WORDS, Interval, Number, Table, number, numbers, ratio_of, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -48,6 +48,8 @@ ALMOST = 0.9
 SLACKER = 0.01
 """Part of the time by which two lines must differ in being slack."""
 SINGLE, ENSEMBLE = "deterministic", "bayesian"
+PAPER = ("nrmse", "nammae")
+"""The measures of the claims."""
 
 
 def claims_table(results: Results) -> Table:
@@ -174,7 +176,7 @@ def _ratio(statistic: Statistic) -> Statistic:
 
 def _against_single(act: Evidence, statistic: Statistic = _median) -> list[Interval]:
     """A statistic of the ensemble over that of the single model, in both measures."""
-    pairs = [(act.cells((), key, ENSEMBLE), act.cells((), key, SINGLE)) for key in HEADING]
+    pairs = [(act.cells((), key, ENSEMBLE), act.cells((), key, SINGLE)) for key in PAPER]
     return [act.interval(_ratio(statistic), ours, other) for ours, other in pairs]
 
 
@@ -239,7 +241,7 @@ class Claims(Evidence):
         return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
     def _who_errs(self) -> Judged:
-        nrmse, nammae = (_share(self, key, LOADS) for key in HEADING)
+        nrmse, nammae = (_share(self, key, LOADS) for key in PAPER)
         slow = _share(self.raw, "nrmse", SLOW).part()
         words = (
             f"loads make {nrmse.part()} of ANRMSE, {nammae.part()} of NAMMAE; act (b): surge and "
@@ -320,7 +322,7 @@ class Claims(Evidence):
         sizes = [test.sizes["window"] for test in both.tests]
         is_regular = np.repeat([False, *[True] * len(REGULAR)], sizes)
         changes = []
-        for key in HEADING:
+        for key in PAPER:
             cells = both.cells((), key)
             parts = (np.where(part, cells, np.nan) for part in (is_regular, ~is_regular))
             changes.append(both.interval(_ratio(_median), *parts))

@@ -50,7 +50,10 @@ FLAGGED, MARKS, TESTS = (_STYLE[what] for what in ("flags", "marks", "tests"))
 """Flagged samples; measured points, by the kind of the waves; runs, by what they are to a model."""
 
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
-"""Names of the paper for the averages of the two measures over the channels."""
+"""Measures that figures and tables show, with the names of their averages over the channels.
+
+The paper's two. Tables take their columns for these from ``report/templates/words.toml``.
+"""
 
 WIDEST = 18
 """Letters of a label on one line: what the height of a panel holds."""

@@ -1,6 +1,6 @@
-"""Wave statistics of measured series.
+"""Waves of measured series: where they begin, periods, heights, spectra, noise and leakage.
 
-Whether a test input repeats a training input, which makes the test meaningless.
+And repeated inputs: a test input that repeats a training input makes the test meaningless.
 """
 
 import math

@@ -1,1 +1,1 @@
-"""Figures of a study: one module per group."""
+"""Figures of studies, forecasts and checks: one module per group."""

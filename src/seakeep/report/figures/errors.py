@@ -47,10 +47,11 @@ LOWEST = 0.8
 
 
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
-    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
+    """Averages (ANRMSE, NAMMAE) of all cells of some test sets, a box-violin per model."""
     figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
+    places = figure.subplots(1, len(HEADING))
     labels = [plain_text(wrapped(result.label_of(test))) for test in tests]
-    for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
+    for axes, (measure, heading) in zip(places, HEADING.items(), strict=True):
         columns = {
             model: [average_of(result.errors(test, model, measure)) for test in tests]
             for model in result.models
@@ -61,13 +62,13 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
 
 
 def channel_boxes(result: StudyResult, test: str) -> Figure:
-    """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
-    figure = new_figure(8.5, 5.6)
+    """Measures (NRMSE, NAMMAE) of all cells of a test set, channel by channel."""
+    figure = new_figure(8.5, 2.8 * len(HEADING))
     models, labels = judged_models(result), list(map(short_label, result.channels))
     errors = [[result.errors(test, model, measure) for model in models] for measure in HEADING]
     scale = "log" if any(_spans_decades(np.concatenate(cells)) for cells in errors) else "linear"
     for axes, measure, cells in zip(
-        figure.subplots(2, 1, sharex=True), HEADING, errors, strict=True
+        figure.subplots(len(HEADING), 1, sharex=True), HEADING, errors, strict=True
     ):
         axes.set_yscale(scale)
         columns = {model: [*each.T] for model, each in zip(models, cells, strict=True)}
