@@ -2,7 +2,8 @@ r"""Statistics of responses, as designers read them: measured against forecast.
 
 Weibull's law of peaks is :math:`P(a > x) = \exp(-(x/b)^k)`; Rayleigh's is that with k = 2 and
 :math:`b = \sqrt 2\,\sigma`. Of N peaks the most probable largest is
-:math:`b\,(\ln N)^{1/k}` (Ochi, 1990, section 4).
+:math:`b\,(\ln N)^{1/k}` (Ochi, 1990, section 4), and the chance that the largest is x or more is
+:math:`1 - (1 - P(a > x))^N`.
 """
 
 from contextlib import suppress
@@ -25,7 +26,7 @@ BAND = 2.0
 HOURS = 3.0
 KINDS = ("measured", "forecast")
 PLACES = 161
-EXTREME = ("extreme", "extreme_lower", "extreme_upper")
+EXTREME = ("extreme", "extreme_lower", "extreme_upper", "extreme_chance")
 
 
 def statistics(
@@ -56,8 +57,9 @@ def statistics(
         ``significant_double_amplitude`` (four SDs), ``zero_crossing_period`` (s), ``peaks`` (how
         many), ``rayleigh_scale`` (the SD), ``weibull_shape`` and ``weibull_scale`` (maximum
         likelihood), ``extreme`` (most probable in the duration by Weibull's law) with
-        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know), and the same of
-        troughs, ``trough``…, with the largest, ``deepest``: NaN of loads in N, which count upward;
+        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know),
+        ``extreme_chance``, by that law, that the largest of so many peaks is as large as the
+        largest here, and the same of troughs, ``trough``…: NaN of loads in N, which count upward;
         over (state, kind, rank): ``peak`` and ``exceedance``, largest first; over (state, kind,
         place):
         ``density`` of the deviations at ``deviation`` over (state, place); over state:
@@ -87,7 +89,6 @@ def statistics(
                 for side in (1, -1)
             )
             troughs = {k.replace("extreme", "trough"): known_below * below[k] for k in EXTREME}
-            troughs["deepest"] = known_below * below["peak"].max()
             laws.append(above.assign(troughs))
         parts.append(xr.concat(laws, xr.Variable("kind", list(moved)), join="outer"))
     names = xr.Variable("state", model.states)
@@ -133,6 +134,8 @@ def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float
     period = periods.mean() if periods.size else np.nan
     law = fit_weibull(peaks)
     extreme = most_probable_extreme(law, duration / period if period else np.nan)
+    above = np.exp(-((peaks.max(initial=0.0) / law.scale) ** law.shape))
+    chance = -np.expm1(law.peaks * np.log1p(-above))
     return xr.Dataset(
         {
             "significant_double_amplitude": 4 * spread,
@@ -141,7 +144,7 @@ def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float
             "rayleigh_scale": spread,
             "weibull_shape": law.shape,
             "weibull_scale": law.scale,
-            **dict(zip(EXTREME, extreme, strict=True)),
+            **dict(zip(EXTREME, (*extreme, chance), strict=True)),
             "peak": ("rank", -np.sort(-peaks)),
             "exceedance": ("rank", rank / (peaks.size + 1)),
         },
