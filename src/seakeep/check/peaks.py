@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy import stats
+from scipy import optimize, stats
 
 from seakeep.arrays import TINY, Datasets, FloatArray
 from seakeep.check.parts import Known, deviations, free_runs, irregular, judged, units_of
@@ -196,19 +196,14 @@ def fit_weibull(peaks: FloatArray) -> Weibull:
         return Weibull(np.nan, np.nan, x.size)
     unit = x / x.max()  # powers stay in range
     logs = np.log(unit)
-    k = 1.2 / max(float(logs.std()), 1e-3)
-    for _ in range(50):
-        power = unit**k
-        total, first, second = power.sum(), power @ logs, power @ logs**2
-        value = first / total - 1 / k - logs.mean()
-        slope = second / total - (first / total) ** 2 + 1 / k**2
-        step = value / slope
-        k = max(k - step, 0.5 * k)
-        if abs(step) < 1e-12 * k:
-            break
+
+    def slope(k: float) -> float:
+        """Of the likelihood, which has one maximum, divided by the number and turned over."""
+        return float(np.average(logs, weights=unit**k) - 1 / k - logs.mean())
+
+    k = optimize.brentq(slope, 1e-4 / logs.std(), 1e4 / logs.std())
     k *= 1 - 1.38 / x.size
-    scale = float(x.max() * np.mean(unit**k) ** (1 / k))
-    return Weibull(float(k), scale, x.size)
+    return Weibull(k, float(x.max() * np.mean(unit**k) ** (1 / k)), x.size)
 
 
 def most_probable_extreme(law: Weibull, peaks: float) -> tuple[float, float, float]:
