@@ -121,7 +121,7 @@ CHANGES = {
         ("name, slice(first + 1, last + 1))", "name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ],
     "check/response.py": [
-        ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
+        ("back = turn[:, None] ** -np.arange(lags)", "back = turn[:, None] ** np.arange(lags)", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ('replace(alignment.settings, surge="measured")', 'replace(alignment.settings, surge="none")', "check/test_response.py::test_measured_phases_count_from_the_waves_where_the_vessel_is"),
         ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("read = input_map.follows.gain(frequency)", "pass", "check/test_response.py::test_a_model_that_follows_its_surge_answers_what_its_carriers_read"),
