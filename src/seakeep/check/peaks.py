@@ -121,19 +121,19 @@ def _densities(both: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float) -> xr.Dataset:
     """Statistics of the deviations of several records of a state; peaks largest first."""
-    every, between = [np.empty(0)], [np.empty(0)]  # peaks and zero-crossing periods
+    every, periods = list[float](), list[float]()
     for x, its_noise in zip(moved, noise, strict=True):
         with suppress(SeakeepError):  # without waves, or lost, a free run has no peaks
             crossings = zero_up_crossings(x, dt, BAND * its_noise / max(x.std(), TINY))
-            if crossings.size > 1:
-                every.append(_peaks(x, crossings / dt))
-                between.append(np.diff(crossings))
-    peaks, periods = np.concatenate(every), np.concatenate(between)
+            edges = np.ceil(crossings / dt).astype(int)
+            every += [x[a:b].max() for a, b in pairwise(edges) if b > a]
+            periods += [*np.diff(crossings)]
+    peaks = np.array(every)
     rank = np.arange(1, peaks.size + 1)
     spread = np.sqrt(np.mean(np.concatenate(moved) ** 2))
-    period = periods.mean() if periods.size else np.nan
+    period = float(np.mean(periods)) if periods else np.nan
     law = fit_weibull(peaks)
-    extreme = most_probable_extreme(law, duration / period if period else np.nan)
+    extreme = most_probable_extreme(law, duration / period)
     above = np.exp(-((peaks.max(initial=0.0) / law.scale) ** law.shape))
     chance = -np.expm1(law.peaks * np.log1p(-above))
     return xr.Dataset(
@@ -170,12 +170,6 @@ class Weibull(NamedTuple):
     shape: float
     scale: float
     peaks: int
-
-
-def _peaks(moved: FloatArray, crossings: FloatArray) -> FloatArray:
-    """Largest deviation between successive zero-up-crossings, which are in samples."""
-    edges = np.ceil(crossings).astype(int)
-    return np.array([moved[a:b].max() for a, b in pairwise(edges) if b > a], dtype=float)
 
 
 def fit_weibull(peaks: FloatArray) -> Weibull:
