@@ -351,9 +351,7 @@ def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
     extremes = [side + end for side in ("extreme", "trough") for end in ("", "_lower", "_upper")]
     shown = _as_shown(result, "mean", "significant_double_amplitude", *extremes)
-    # An extreme counts with its interval, and a divergence is that of the forecast.
-    for key in ("extreme", "trough"):
-        shown[key] = shown[key].where(np.isfinite(shown[f"{key}_upper"]))
+    # A divergence is that of the forecast.
     shown["divergence"] = shown["divergence"].where(shown["kind"] == "forecast")
     points = [
         f"{at['state'].item()}: by the law fitted, fewer than 1 in 100 such records hold a "
