@@ -121,7 +121,7 @@ CHANGES = {
         ("name, slice(first + 1, last + 1))", "name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ],
     "check/response.py": [
-        ("back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
+        ("back = turn[:, None] ** -np.arange(lags)", "back = turn[:, None] ** np.arange(lags)", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ('replace(alignment.settings, surge="measured")', 'replace(alignment.settings, surge="none")', "check/test_response.py::test_measured_phases_count_from_the_waves_where_the_vessel_is"),
         ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("read = input_map.follows.gain(frequency)", "pass", "check/test_response.py::test_a_model_that_follows_its_surge_answers_what_its_carriers_read"),
@@ -525,8 +525,8 @@ CHANGES = {
         ("key: one[key].values for", "key: one[keys[0]].values for", "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
     ],
     "report/check_page.py": [
-        ('or at["trough"] < at["deepest"]', "", "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
-        ('if at["extreme"] < at["peak"].max() or', "if", "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
+        ('or at["trough_chance"] < RARE', "", "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
+        ('if at["extreme_chance"] < RARE or', "if", "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
         ('{*result["input"].values} - {"wave"}', '{"wave"}', "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
         ('float(own["correlation"]) < TURNED', 'float(own["correlation"]) > -TURNED', "check/test_coherence.py::test_a_channel_that_is_turned_over_is_told_so"),
     ],

@@ -63,6 +63,9 @@ def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
         float(found[f"extreme_{each}"].sel(kind="measured")) for each in ("lower", "upper")
     )
     assert low < 0.008 * np.sqrt(2 * np.log(900)) < high
+    at = found.sel(kind="measured")
+    above = np.exp(-((at.peak.max() / at.weibull_scale) ** at.weibull_shape))
+    assert at.extreme_chance == pytest.approx(float(1 - (1 - above) ** at.peaks), rel=1e-6)
     step = float(found.deviation[1] - found.deviation[0])
     assert (step * found.density.sum("place")).values == pytest.approx(1.0, abs=0.01)
     assert 0 <= found.divergence < 0.01  # the model follows the sea
@@ -79,7 +82,7 @@ def test_troughs_have_a_law_of_their_own(model, train):
     )
     # Half a wave more or less at either end, and the mean.
     assert found.trough.values == pytest.approx(turned.extreme.values, rel=0.02)
-    assert found.deepest.values == pytest.approx(turned.peak.max("rank").values, rel=1e-6)
+    assert found.trough_chance.values == pytest.approx(turned.extreme_chance.values, rel=0.1)
     assert 1.3 * found.extreme < found.trough < found.trough_upper
     load = train.assign(load=train.heave.assign_attrs(units="N"))
     spec = HankelDMDc(0, 1, 1e-6, delay_rows="exact").fit({"train": load}, ["load"], ["eta"])

@@ -102,10 +102,11 @@ def test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told():
     sections = {each.key: each for each in check_sections(checked)}
     assert "inputs (damper) are at their means" in " ".join(sections["response"].words)
     found = checked.results["statistics"]
-    for side, largest in (("extreme", found["peak"].max("rank")), ("trough", found["deepest"])):
-        for part, told in ((1.01, 0), (0.99, 1)):
-            fits = found.assign(extreme=found["extreme"] + 1.0, trough=found["trough"] + 1.0)
-            fits[side] = part * largest
+    sides = ["extreme_chance", "trough_chance"]
+    for side in sides:
+        for chance, told in ((0.011, 0), (0.009, 1)):
+            fits = found.assign(1.0 + 0 * found[sides])
+            fits[side] *= chance
             shown = check_sections(Checked({"statistics": fits}, {}, {}))
             (section,) = (each for each in shown if each.key == "statistics")
             assert len(section.points) == told

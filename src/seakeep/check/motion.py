@@ -6,7 +6,7 @@ is :math:`\delta_k = 2 \ln(a_k / a_{k+1}) = p + q\,\bar a_k`: p is linear dampin
 :math:`\zeta = p / \sqrt{4\pi^2 + p^2}`, and q quadratic (Himeno, 1981; ITTC 7.5-02-07-04.5).
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
@@ -129,9 +129,11 @@ def decay(model: Model) -> xr.Dataset:
         run = single.forecast_arrays(moved, still, ahead, steps)
         left = np.concatenate([[1.0], (run - rest)[:, column] / offset])
         released = free_decay(left[np.isfinite(left)], single.dt)
-        linear = released.decrements.mean() if released.cycles else np.nan
+        period = linear = np.nan
+        if released:
+            period, linear = released["period"].item(), released["decrement"].values.mean()
         damping = linear / np.hypot(2 * np.pi, linear)
-        facts = {"offset": offset, "period": released.period, "damping_ratio": damping, "p": linear}
+        facts = {"offset": offset, "period": period, "damping_ratio": damping, "p": linear}
         rows.append(xr.Dataset({"displacement": ("time", left), **facts}))
     return xr.concat(rows, xr.Variable("motion", motions)).assign_coords(
         units=("motion", units_of(single, motions)),
@@ -181,18 +183,9 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
         first = np.argmax(np.abs(moved[:, column]))
         noise = run[motions[column]].attrs.get("noise_std", 0.0)
         found = free_decay(values[first:, column], model.dt, noise)
-        if not found.cycles:
+        if found is None:
             raise DataError("no motion swings above its noise. Was anything released?")
-        keys = ("period", "damping_ratio", "p", "q", "cycles")
-        return xr.Dataset(
-            {
-                "motion": motions[column],
-                **{key: getattr(found, key) for key in keys},
-                "amplitude": ("cycle", found.amplitudes),
-                "decrement": ("cycle", found.decrements),
-            },
-            {"cycle": range(found.cycles)},
-        )
+        return found.assign(motion=motions[column])
 
     parts = gathered(still, released, "no run in still water is a free decay.", "no decay from")
     names = xr.Variable("run", list(parts))
@@ -207,33 +200,7 @@ APART = 2.0
 """Half periods of the largest swing after which the next extreme is another motion's."""
 
 
-class Decay(NamedTuple):
-    """What a decaying oscillation shows; NaN where it has too few extremes.
-
-    Attributes
-    ----------
-    period : float
-        Damped period.
-    damping_ratio : float
-        Of small amplitudes, from p.
-    p, q : float
-        Decrement of a cycle at zero amplitude, and its growth per unit of amplitude.
-    cycles : int
-        Number of decrements.
-    amplitudes, decrements : ndarray, shape (cycles,)
-        Mean amplitude (geometric) and decrement of each.
-    """
-
-    period: float
-    damping_ratio: float
-    p: float
-    q: float
-    cycles: int
-    amplitudes: FloatArray
-    decrements: FloatArray
-
-
-def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> Decay:
+def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> xr.Dataset | None:
     """Period, p and q of a series that was released; a constant in it does not matter.
 
     Swings count from the largest on, until one is lost in noise. Extremes are those of parabolas
@@ -251,24 +218,27 @@ def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> Decay:
 
     Returns
     -------
-    Decay
+    Dataset or None
+        The damped ``period``; ``damping_ratio``, of small amplitudes, from p; ``p`` and ``q``, the
+        decrement of a cycle at zero amplitude and its growth per unit of amplitude; ``cycles``, the
+        number of decrements; over cycle ``amplitude``, the geometric mean, and ``decrement``. None
+        where there are too few extremes.
 
     Examples
     --------
     >>> t = np.arange(0, 60, 0.05)
     >>> found = free_decay(np.exp(-0.05 * t) * np.cos(t), 0.05)
-    >>> round(found.period / (2 * np.pi), 3), round(found.damping_ratio, 3)
+    >>> round(float(found.period) / (2 * np.pi), 3), round(float(found.damping_ratio), 3)
     (1.0, 0.05)
     """
     least = max(SMALLEST * np.ptp(series), 2 * NOISE * noise)
-    nothing = Decay(np.nan, np.nan, np.nan, np.nan, 0, np.empty(0), np.empty(0))
     places = np.sort(
         np.concatenate(
             [scipy.signal.find_peaks(sign * series, prominence=least)[0] for sign in (1, -1)]
         )
     )
     if places.size < 3:
-        return nothing
+        return None
     places = places[np.argmax(np.abs(np.diff(series[places]))) :]  # other modes die out before
     window = 2 * max((places[1] - places[0]) // 3, 1) + 1
     value, slope, bend = (
@@ -278,7 +248,7 @@ def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> Decay:
     gaps = np.diff(places + shift)
     length = int(np.argmin(np.append(gaps < APART * gaps[0], False)))
     if length < 2:
-        return nothing
+        return None
     gaps, ranges = gaps[:length], 0.5 * np.abs(np.diff(value + 0.5 * slope * shift))[:length]
     decrements = 2 * np.log(ranges[:-1] / ranges[1:])
     amplitudes = np.sqrt(ranges[:-1] * ranges[1:])
@@ -286,8 +256,18 @@ def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> Decay:
     if decrements.size >= 3:
         q, p = map(float, np.polyfit(amplitudes, decrements, 1, w=amplitudes))
     period = 2 * dt * float(np.average(gaps, weights=ranges))
-    ratio = float(p / np.hypot(2 * np.pi, p))
-    return Decay(period, ratio, p, q, decrements.size, amplitudes, decrements)
+    return xr.Dataset(
+        {
+            "period": period,
+            "damping_ratio": p / np.hypot(2 * np.pi, p),
+            "p": p,
+            "q": q,
+            "cycles": decrements.size,
+            "amplitude": ("cycle", amplitudes),
+            "decrement": ("cycle", decrements),
+        },
+        {"cycle": range(decrements.size)},
+    )
 
 
 PERIODS = 32

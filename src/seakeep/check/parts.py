@@ -141,9 +141,21 @@ def free_runs(
     known = ({} if free is None else free).setdefault(label, {})
 
     def played(name: str) -> FreeRun:
-        if name not in known:
-            history = [each.history_samples for each in others]
-            known[name] = _free_run(model, runs[name], name, (like or {}).get(name), history)
+        if name in known:
+            return known[name]
+        run = runs[name]
+        if like:
+            time, _, measured = like[name]
+        else:
+            at, last = window_of(model, run, [each.history_samples for each in others])
+            time = run["time"].values[at + 1 : last + 1]
+            measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+        start = float(time[0]) - model.dt
+        if is_ensemble(model):
+            forecast = model.forecast_summary(run, start, len(time)).sel(statistic="mean")
+        else:
+            forecast = model.forecast(run, start, len(time))
+        known[name] = FreeRun(time, channel_matrix(forecast, model.states, name), measured)
         return known[name]
 
     names = runs if like is None else like
@@ -290,23 +302,6 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
             if np.isfinite(series).all() and np.ptp(series):
                 begins.append(first_wave(series, name in MOTIONS))
     return max(begins)
-
-
-def _free_run(
-    model: Model, run: xr.Dataset, name: str, like: FreeRun | None, further: Iterable[int]
-) -> FreeRun:
-    if like:
-        time, _, measured = like
-    else:
-        at, last = window_of(model, run, further)
-        time = run["time"].values[at + 1 : last + 1]
-        measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
-    start = float(time[0]) - model.dt
-    if is_ensemble(model):
-        forecast = model.forecast_summary(run, start, len(time)).sel(statistic="mean")
-    else:
-        forecast = model.forecast(run, start, len(time))
-    return FreeRun(time, channel_matrix(forecast, model.states, name), measured)
 
 
 def whole_span(run: xr.Dataset, *uses: str) -> tuple[float, float]:

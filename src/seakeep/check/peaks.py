@@ -2,7 +2,8 @@ r"""Statistics of responses, as designers read them: measured against forecast.
 
 Weibull's law of peaks is :math:`P(a > x) = \exp(-(x/b)^k)`; Rayleigh's is that with k = 2 and
 :math:`b = \sqrt 2\,\sigma`. Of N peaks the most probable largest is
-:math:`b\,(\ln N)^{1/k}` (Ochi, 1990, section 4).
+:math:`b\,(\ln N)^{1/k}` (Ochi, 1990, section 4), and the chance that the largest is x or more is
+:math:`1 - (1 - P(a > x))^N`.
 """
 
 from contextlib import suppress
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy import stats
+from scipy import optimize, stats
 
 from seakeep.arrays import TINY, Datasets, FloatArray
 from seakeep.check.parts import Known, deviations, free_runs, irregular, judged, units_of
@@ -25,7 +26,7 @@ BAND = 2.0
 HOURS = 3.0
 KINDS = ("measured", "forecast")
 PLACES = 161
-EXTREME = ("extreme", "extreme_lower", "extreme_upper")
+EXTREME = ("extreme", "extreme_lower", "extreme_upper", "extreme_chance")
 
 
 def statistics(
@@ -56,8 +57,9 @@ def statistics(
         ``significant_double_amplitude`` (four SDs), ``zero_crossing_period`` (s), ``peaks`` (how
         many), ``rayleigh_scale`` (the SD), ``weibull_shape`` and ``weibull_scale`` (maximum
         likelihood), ``extreme`` (most probable in the duration by Weibull's law) with
-        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know), and the same of
-        troughs, ``trough``…, with the largest, ``deepest``: NaN of loads in N, which count upward;
+        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know),
+        ``extreme_chance``, by that law, that the largest of so many peaks is as large as the
+        largest here, and the same of troughs, ``trough``…: NaN of loads in N, which count upward;
         over (state, kind, rank): ``peak`` and ``exceedance``, largest first; over (state, kind,
         place):
         ``density`` of the deviations at ``deviation`` over (state, place); over state:
@@ -87,7 +89,6 @@ def statistics(
                 for side in (1, -1)
             )
             troughs = {k.replace("extreme", "trough"): known_below * below[k] for k in EXTREME}
-            troughs["deepest"] = known_below * below["peak"].max()
             laws.append(above.assign(troughs))
         parts.append(xr.concat(laws, xr.Variable("kind", list(moved)), join="outer"))
     names = xr.Variable("state", model.states)
@@ -120,19 +121,21 @@ def _densities(both: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float) -> xr.Dataset:
     """Statistics of the deviations of several records of a state; peaks largest first."""
-    every, between = [np.empty(0)], [np.empty(0)]  # peaks and zero-crossing periods
+    every, periods = list[float](), list[float]()
     for x, its_noise in zip(moved, noise, strict=True):
         with suppress(SeakeepError):  # without waves, or lost, a free run has no peaks
             crossings = zero_up_crossings(x, dt, BAND * its_noise / max(x.std(), TINY))
-            if crossings.size > 1:
-                every.append(_peaks(x, crossings / dt))
-                between.append(np.diff(crossings))
-    peaks, periods = np.concatenate(every), np.concatenate(between)
+            edges = np.ceil(crossings / dt).astype(int)
+            every += [x[a:b].max() for a, b in pairwise(edges) if b > a]
+            periods += [*np.diff(crossings)]
+    peaks = np.array(every)
     rank = np.arange(1, peaks.size + 1)
     spread = np.sqrt(np.mean(np.concatenate(moved) ** 2))
-    period = periods.mean() if periods.size else np.nan
+    period = float(np.mean(periods)) if periods else np.nan
     law = fit_weibull(peaks)
-    extreme = most_probable_extreme(law, duration / period if period else np.nan)
+    extreme = most_probable_extreme(law, duration / period)
+    above = np.exp(-((peaks.max(initial=0.0) / law.scale) ** law.shape))
+    chance = -np.expm1(law.peaks * np.log1p(-above))
     return xr.Dataset(
         {
             "significant_double_amplitude": 4 * spread,
@@ -141,7 +144,7 @@ def _law(moved: list[FloatArray], noise: list[float], dt: float, duration: float
             "rayleigh_scale": spread,
             "weibull_shape": law.shape,
             "weibull_scale": law.scale,
-            **dict(zip(EXTREME, extreme, strict=True)),
+            **dict(zip(EXTREME, (*extreme, chance), strict=True)),
             "peak": ("rank", -np.sort(-peaks)),
             "exceedance": ("rank", rank / (peaks.size + 1)),
         },
@@ -169,12 +172,6 @@ class Weibull(NamedTuple):
     peaks: int
 
 
-def _peaks(moved: FloatArray, crossings: FloatArray) -> FloatArray:
-    """Largest deviation between successive zero-up-crossings, which are in samples."""
-    edges = np.ceil(crossings).astype(int)
-    return np.array([moved[a:b].max() for a, b in pairwise(edges) if b > a], dtype=float)
-
-
 def fit_weibull(peaks: FloatArray) -> Weibull:
     r"""Fit Weibull's law to positive peaks by maximum likelihood.
 
@@ -193,19 +190,14 @@ def fit_weibull(peaks: FloatArray) -> Weibull:
         return Weibull(np.nan, np.nan, x.size)
     unit = x / x.max()  # powers stay in range
     logs = np.log(unit)
-    k = 1.2 / max(float(logs.std()), 1e-3)
-    for _ in range(50):
-        power = unit**k
-        total, first, second = power.sum(), power @ logs, power @ logs**2
-        value = first / total - 1 / k - logs.mean()
-        slope = second / total - (first / total) ** 2 + 1 / k**2
-        step = value / slope
-        k = max(k - step, 0.5 * k)
-        if abs(step) < 1e-12 * k:
-            break
+
+    def slope(k: float) -> float:
+        """Of the likelihood, which has one maximum, divided by the number and turned over."""
+        return float(np.average(logs, weights=unit**k) - 1 / k - logs.mean())
+
+    k = optimize.brentq(slope, 1e-4 / logs.std(), 1e4 / logs.std())
     k *= 1 - 1.38 / x.size
-    scale = float(x.max() * np.mean(unit**k) ** (1 / k))
-    return Weibull(float(k), scale, x.size)
+    return Weibull(k, float(x.max() * np.mean(unit**k) ** (1 / k)), x.size)
 
 
 def most_probable_extreme(law: Weibull, peaks: float) -> tuple[float, float, float]:

@@ -167,62 +167,39 @@ def response(
 
 
 def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> ComplexArray:
-    """Transfer functions of a member from all regressors, physical units, (frequency, N, n + m)."""
-    own = dynamics.signature
-    gain = frequency_response(
-        *dynamics.matrices,
-        2 * np.pi * frequency * model.dt,
-        len(own.state_labels),
-        len(own.input_scale.mean),
-        own.input_delays,
-    )
-    scale = np.concatenate([own.input_scale.std, own.direct_scale.std])
-    return gain * own.state_scale.std[:, None] / scale
-
-
-def frequency_response(
-    state_rows: FloatArray,
-    input_rows: FloatArray,
-    omega: FloatArray,
-    n_states: int,
-    n_delayed: int,
-    input_delays: int,
-) -> ComplexArray:
-    r"""Transfer functions of a delayed model, :math:`(e^{i\omega} I - \hat A)^{-1} \hat B(\omega)`.
-
-    Parameters
-    ----------
-    state_rows : ndarray, shape (N or N(s+1), N(s+1))
-        Regressed rows of Â, newest block first; with N rows the others shift the delays.
-    input_rows : ndarray, shape (as many rows, n(z+1) + m)
-        The same rows of B̂: n regressors with z delays, then m without.
-    omega : ndarray, shape (frequency,)
-        Radians per sample, 0 to π.
-    n_states, n_delayed, input_delays : int
-        N, n and z.
+    r"""Transfer functions of a member, :math:`(e^{i\omega} I - \hat A)^{-1} \hat B(\omega)`.
 
     Returns
     -------
     ndarray of complex, shape (frequency, N, n + m)
-        Output per input, both as the coefficients have them (standardised).
+        From the n regressors with delays, then the m without, in physical units.
     """
-    turn = np.exp(1j * np.asarray(omega, dtype=float))
-    lagged = n_delayed * (input_delays + 1)
-    back = turn[:, None] ** -np.arange(input_delays + 1)
-    delayed = input_rows[:, :lagged].reshape(-1, input_delays + 1, n_delayed)
-    direct = np.broadcast_to(input_rows[:, lagged:], (turn.size, *input_rows[:, lagged:].shape))
-    driven = np.concatenate([np.einsum("fl,rlq->frq", back, delayed), direct], axis=2)
+    own = dynamics.signature
+    state_rows, input_rows = dynamics.matrices  # newest block first
+    turn = np.exp(2j * np.pi * frequency * model.dt)
+    scale = np.concatenate([own.input_scale.std, own.direct_scale.std])
+    n_states, lags = len(own.state_labels), own.input_delays + 1
+    delayed, direct = np.split(input_rows, [own.input_scale.std.size * lags], axis=1)
+    back = turn[:, None] ** -np.arange(lags)
+    driven = np.concatenate(
+        [
+            np.einsum("fl,rlq->frq", back, delayed.reshape(len(delayed), lags, -1)),
+            np.broadcast_to(direct, (turn.size, *direct.shape)),
+        ],
+        axis=2,
+    )
     size = state_rows.shape[1]
-    if len(state_rows) == n_states:
-        lags = size // n_states
-        back = turn[:, None] ** -np.arange(lags)
-        rows = state_rows.reshape(n_states, lags, n_states)
+    if len(state_rows) == n_states:  # the others shift the delays
+        rows = state_rows.reshape(n_states, -1, n_states)
+        back = turn[:, None] ** -np.arange(rows.shape[1])
         system = turn[:, None, None] * np.eye(n_states) - np.einsum("fl,rlj->frj", back, rows)
-        return np.linalg.solve(system, driven)
-    # One frequency at a time: the whole of Â is large.
-    each = [np.linalg.solve(z * np.eye(size) - state_rows, b)[:n_states]
-            for z, b in zip(turn, driven, strict=True)]  # fmt: skip
-    return np.array(each, dtype=complex)
+        gain = np.linalg.solve(system, driven)
+    else:  # one frequency at a time: the whole of Â is large
+        gain = np.array([
+            np.linalg.solve(z * np.eye(size) - state_rows, b)[:n_states]
+            for z, b in zip(turn, driven, strict=True)
+        ])  # fmt: skip
+    return gain * own.state_scale.std[:, None] / scale
 
 
 def _default_frequencies(coverage: Coverage, dt: float) -> FloatArray:

@@ -32,6 +32,8 @@ OVERSHOOT = 1.1
 """Largest swing over the offset that a free decay may show; the rest is for the noise of a fit."""
 TURNED = -0.8
 """Correlation of forecast and measurement below which one of them looks turned over."""
+RARE = 0.01
+"""Chance of so large a peak, or trough, below which the law fitted does not hold for it."""
 
 USES = {
     0.1: "can stand in for a measurement (error below 0.1 SD)",
@@ -349,15 +351,14 @@ def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
     extremes = [side + end for side in ("extreme", "trough") for end in ("", "_lower", "_upper")]
     shown = _as_shown(result, "mean", "significant_double_amplitude", *extremes)
-    # An extreme counts with its interval, and a divergence is that of the forecast.
-    for key in ("extreme", "trough"):
-        shown[key] = shown[key].where(np.isfinite(shown[f"{key}_upper"]))
+    # A divergence is that of the forecast.
     shown["divergence"] = shown["divergence"].where(shown["kind"] == "forecast")
     points = [
-        f"{at['state'].item()}: the largest deviation measured is beyond the extreme expected. "
-        "The law does not hold for the largest, as where seas of several kinds are judged together."
+        f"{at['state'].item()}: by the law fitted, fewer than 1 in 100 such records hold a "
+        "deviation as large as the largest measured. The law does not hold for the largest, as "
+        "where seas of several kinds are judged together."
         for at in entries(result.sel(kind="measured"), "state")
-        if at["extreme"] < at["peak"].max() or at["trough"] < at["deepest"]
+        if at["extreme_chance"] < RARE or at["trough_chance"] < RARE
     ]
     return section(
         "statistics",

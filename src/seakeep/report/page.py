@@ -184,7 +184,6 @@ def rendered(**content: Any) -> str:
     environment.filters["breakable"] = lambda text: escape(_set(text)).replace(
         "_", Markup("_<wbr>")
     )
-    environment.filters["minus"] = with_minus
     environment.finalize = lambda each: each if isinstance(each, Markup) else _set(str(each))
     return environment.get_template("report.html").render(**content)
 

@@ -303,17 +303,6 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     return float(np.mean(shares)) if shares else 0.0
 
 
-def needs_of(specs: Sequence[Spec], dt: float, encounter_period: float) -> Needs:
-    """Samples that the most demanding of several models needs: the same windows serve all."""
-    each = [spec.needs(dt, encounter_period) for spec in specs]
-    return Needs(
-        max(needs.snapshots for needs in each),
-        max(needs.history for needs in each),
-        all(needs.inside for needs in each),
-        max(needs.lead for needs in each),
-    )
-
-
 def training_samples(needs: Needs) -> int:
     """Samples up to and including the stop of a training window."""
     return max(needs.snapshots, needs.history + 2) + (0 if needs.inside else needs.history)
@@ -410,7 +399,14 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
         )
         for name, each in settings.models.items()
     }
-    needs = needs_of([each.spec for each in models.values()], dt, period)
+    # The same windows serve all models.
+    each_needs = [each.spec.needs(dt, period) for each in models.values()]
+    needs = Needs(
+        max(each.snapshots for each in each_needs),
+        max(each.history for each in each_needs),
+        all(each.inside for each in each_needs),
+        max(each.lead for each in each_needs),
+    )
     training = choose_training(settings, runs, training_names, needs, study.inputs)
     tests = {
         name: choose_tests(

@@ -297,13 +297,8 @@ def detrended_text(campaign: str) -> str:
     where the vessel is.
     """
     text = campaign.replace('"raw/', '"../raw/')
-    for name in SLOW:
-        text = re.sub(
-            rf"^\[(channels|derived)\.{name}\]", rf"[\1.{name}_with_drift]", text, flags=re.M
-        )
-        text = re.sub(
-            rf'^(from|position) = "{name}"', rf'\1 = "{name}_with_drift"', text, flags=re.M
-        )
+    place = rf'^(\[(?:channels|derived)\.|(?:from|position) = ")({"|".join(SLOW)})(?=[]"])'
+    text = re.sub(place, r"\1\2_with_drift", text, flags=re.M)
     texts = [
         f'[derived.{name}]\nfrom = "{name}_with_drift"\nstep = "band_pass"\n'
         f"band = [{HIGH_PASS:g}, {HIGHEST:g}]  # Hz\n"
