@@ -273,6 +273,7 @@ def test_one_file_of_full_scale_is_named_and_spoils_no_other(tmp_path, drafted, 
     text, campaign = drafted([*alike, tank_file(tmp_path, "full", 1, 49.0, 7.0)])
     roles = {name: run.role for name, run in campaign.settings.runs.items()}
     assert roles == {"a0": "train", "a1": "train", "a2": "test", "full": "unused"}
+    assert campaign.settings.runs["a0"].waves == "irregular"
     assert 'role = "unused" # guessed: its waves are 49 times those of the others (median)' in text
     quiet = [tank_file(tmp_path, f"decay{seed}", seed, 0.02) for seed in range(3)]
     _, campaign = drafted([alike[0], *quiet])
