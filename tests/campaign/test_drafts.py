@@ -27,6 +27,19 @@ def drafted(tmp_path):
     return draft
 
 
+def tank_file(folder, name, seed=0, size=1.0, slower=1.0):
+    """Of a minute, larger and slower than the tank's."""
+    columns = {key: size * each for key, each in tank_columns(seed, 60.0).items()}
+    columns["Time [s]"] *= slower / size
+    return write_csv(folder / f"{name}.csv", columns)
+
+
+@pytest.fixture
+def alike(tmp_path):
+    """Files of three runs in the same sea."""
+    return [tank_file(tmp_path, f"a{seed}", seed) for seed in range(3)]
+
+
 GUESSES = {
     "": {
         ("HEAVE_CoG", "mm"): "heave",
@@ -240,14 +253,10 @@ def test_what_has_long_gaps_is_left_out_with_a_word(drafted, lost):
         assert said in text
 
 
-def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted):
+def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted, alike):
     """Regular and still runs are recognised; the last file is no test for being the last."""
-    files = [write_csv(tmp_path / f"a{i}.csv", tank_columns(i, 60.0)) for i in range(3)]
-    files += [regular(tmp_path, "b0", 1.5)]
-    still = {name: 1e-3 * each for name, each in tank_columns(9, 60.0).items()}
-    still["Time [s]"] *= 1e3
-    files += [write_csv(tmp_path / "c_decay.csv", still)]
-    text, campaign = drafted(files)
+    still = tank_file(tmp_path, "c_decay", 9, 1e-3)
+    text, campaign = drafted([*alike, regular(tmp_path, "b0", 1.5), still])
     runs = campaign.settings.runs
     assert [runs[n].waves for n in ("a0", "b0", "c_decay")] == ["irregular", "regular", None]
     assert {n: run.role for n, run in runs.items()} == {
@@ -255,26 +264,19 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted):
     }  # fmt: skip
     assert 'waves = "regular" # guessed from its spectrum' in text
     assert 'role = "unused" # guessed: no waves were found, as in still water, decay tests' in text
-    text, _ = drafted([files[0], files[-1]])
+    text, _ = drafted([alike[0], still])
     assert 'role = "train" # the only run to train on\n' in text
 
 
-def test_one_file_of_full_scale_is_named_and_spoils_no_other(tmp_path, drafted):
+def test_one_file_of_full_scale_is_named_and_spoils_no_other(tmp_path, drafted, alike):
     """What a decay radiates is less steep than the waves, so they are not the odd ones."""
-    files = [write_csv(tmp_path / f"a{i}.csv", tank_columns(i, 60.0)) for i in range(3)]
-    full = {name: (7 if "Time" in name else 49) * x for name, x in tank_columns(1, 60.0).items()}
-    text, campaign = drafted([*files, write_csv(tmp_path / "full.csv", full)])
+    text, campaign = drafted([*alike, tank_file(tmp_path, "full", 1, 49.0, 7.0)])
     roles = {name: run.role for name, run in campaign.settings.runs.items()}
     assert roles == {"a0": "train", "a1": "train", "a2": "test", "full": "unused"}
     assert campaign.settings.runs["a0"].waves == "irregular"
     assert 'role = "unused" # guessed: its waves are 49 times those of the others (median)' in text
-    quiet = [
-        write_csv(tmp_path / f"decay{i}.csv", {
-            name: (1 if "Time" in name else 0.02) * x for name, x in tank_columns(i, 60.0).items()
-        })
-        for i in range(3)
-    ]  # fmt: skip
-    _, campaign = drafted([files[0], *quiet])
+    quiet = [tank_file(tmp_path, f"decay{seed}", seed, 0.02) for seed in range(3)]
+    _, campaign = drafted([alike[0], *quiet])
     assert [run.role for run in campaign.settings.runs.values()] == ["train", *3 * ["unused"]]
 
 
@@ -321,17 +323,16 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path,
 
 def test_a_unit_that_some_files_state_is_that_of_all(tmp_path, drafted):
     """Where they disagree, each keeps its own."""
-    columns = tank_columns(0, 60.0)
-    bare = {"Heave" if name == "Heave [mm]" else name: x for name, x in columns.items()}
-    silent = write_csv(tmp_path / "silent.csv", bare)
-    said = [write_csv(tmp_path / f"said{i}.csv", tank_columns(i, 60.0)) for i in range(2)]
+    rest = tank_columns(0, 60.0)
+    heave = rest.pop("Heave [mm]")
+    silent = write_csv(tmp_path / "silent.csv", rest | {"Heave": heave})
+    said = [tank_file(tmp_path, f"said{seed}", seed) for seed in range(2)]
     text, campaign = drafted([silent, *said])
     assert 'unit = "mm" # guessed: some files say it, the others state none.' in text
     assert text.count("\nunit = ") == 1
     runs = campaign.prepare()
     np.testing.assert_array_equal(runs["silent"]["heave"], runs["said0"]["heave"])
-    del bare["Heave"]
-    other = write_csv(tmp_path / "other.csv", {**bare, "Heave [cm]": columns["Heave [mm]"] / 10})
+    other = write_csv(tmp_path / "other.csv", rest | {"Heave [cm]": heave / 10})
     text, _ = drafted([silent, *said, other])
     assert "\nunit = " not in text
 

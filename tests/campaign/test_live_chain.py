@@ -1,7 +1,5 @@
 """Raw samples in service: the chain on a window that moves gives what it gives offline."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import two_loggers
@@ -100,24 +98,26 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
 
 def test_seconds_of_day_go_on_counting_over_each_midnight(campaign, rows):
     counted = rows["t"] + 2 * 86400.0 - 30.0
-    single = np.r_[0, 500, 747:753, 800:1500:100]  # midnight is row 750, between two parts
-    lost = np.r_[0, 500, 740, 765, 800:1500:100]  # and here between rows that came
-    for of_day, parts, gap in (
-        (np.where(rows["t"] < 20.0, counted, counted % 86400.0), single, range(0)),
-        (counted % 86400.0, single, range(0)),
-        (counted % 86400.0, lost, range(740, 765)),
+    of_day, near = counted % 86400.0, [slice(740, 750), slice(750, 751), slice(751, 765)]
+    for told, midnight in (
+        (np.where(rows["t"] < 20.0, counted, of_day), near),
+        (of_day, near),
+        (of_day, []),  # its rows are lost
     ):
         whole, fallen = chain_of(campaign), chain_of(campaign)
-        first = counted[0] - of_day[0]
-        for start, stop in pairwise(parts):
-            if start in gap:
-                continue
-            part = {name: each[start:stop] for name, each in rows.items()}
-            expected = whole.push({"": part | {"t": counted[start:stop] - first}})
-            found = fallen.push({"": part | {"t": of_day[start:stop]}})
+        for part in (
+            slice(0, 500),
+            slice(500, 740),
+            *midnight,
+            slice(765, 1000),
+            slice(1000, 1500),
+        ):
+            sent = {name: each[part] for name, each in rows.items()}
+            expected = whole.push({"": sent | {"t": counted[part] - counted[0] + told[0]}})
+            found = fallen.push({"": sent | {"t": told[part]}})
             xr.testing.assert_identical(found, expected)
         with request_error("do not increase.*Send each row once"):
-            fallen.push({"": part | {"t": counted[start:stop] - first}})
+            fallen.push({"": sent | {"t": told[part]}})
 
 
 def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):

@@ -83,7 +83,7 @@ def test_troughs_have_a_law_of_their_own(model, train):
     # Half a wave more or less at either end, and the mean.
     assert found.trough.values == pytest.approx(turned.extreme.values, rel=0.02)
     assert found.trough_chance.values == pytest.approx(turned.extreme_chance.values, rel=0.1)
-    assert 1.3 * found.extreme < found.trough < found.trough_upper
+    assert 1.3 * found.extreme < found.trough
     load = train.assign(load=train.heave.assign_attrs(units="N"))
     spec = HankelDMDc(0, 1, 1e-6, delay_rows="exact").fit({"train": load}, ["load"], ["eta"])
     assert check.statistics(spec, {"test": load}).trough.isnull().all()

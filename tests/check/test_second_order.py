@@ -4,6 +4,7 @@ from math import tau
 
 import numpy as np
 import pytest
+import xarray as xr
 from records import record
 from scipy import signal
 from seas import sea
@@ -15,19 +16,19 @@ DT, PERIOD = 0.1, 1.0
 GAIN, MEMORY = 0.3, 0.9
 
 
-def drifting_run(samples=2000, waves=None, **attrs):
+def drifting_run(samples=2000, regular=None, **attrs):
     """A surge that remembers, and is pushed by the square of the wave."""
     time = DT * np.arange(samples)
-    if waves is None:
+    if regular is None:
         wave = 0.45 * sea(0, (0.7, 1.3), PERIOD, 40).at(time)
     else:
-        wave = 0.5 * np.cos(tau * waves * time)
+        wave = 0.5 * np.cos(tau * regular * time)
     surge = signal.lfilter([0.0, GAIN], [1.0, -MEMORY], wave**2)
     return record(DT, {"encounter_period": PERIOD, **attrs}, eta=wave, surge=surge)
 
 
 SQUARE = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
-REGULAR = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
+REGULAR = drifting_run(1500, 0.9, waves="regular")
 
 
 def test_drift_of_a_square_is_its_own():
@@ -44,10 +45,10 @@ def test_drift_of_a_square_is_its_own():
 
 
 def test_drift_is_counted_from_the_rest_in_the_wind_of_the_run():
-    def blown(run, mean):
+    def blown(run, mean, rest=0.0):
         wind = mean + np.sin(2.0 * np.arange(run.time.size))
         moved = signal.lfilter([0.0, 0.5], [1.0, -MEMORY], wind)
-        run = run.assign(wind=run.eta.copy(data=wind), surge=run.surge + moved)
+        run = run.assign(wind=run.eta.copy(data=wind), surge=run.surge + moved + rest)
         return run.isel(time=slice(300, None))  # settled
 
     model = SQUARE.fit(blown(drifting_run(), 4.0), ["surge"], ["eta", "wind"])
@@ -58,24 +59,18 @@ def test_drift_is_counted_from_the_rest_in_the_wind_of_the_run():
     assert found.attrs["rest"] == "as the model has it"
 
     # A surge that rests 0.4 m farther than the model's, in waves and, in another wind, without.
-    def farther(run, mean):
-        return blown(run, mean).assign(surge=lambda each: each.surge + 0.4)
-
-    calm = farther(drifting_run(waves=0.0).map(lambda each: each.copy(data=0 * each)), 2.0)
-    runs = {"regular": farther(REGULAR, 7.0), "calm": calm.assign_attrs(waves="still")}
-    found = check.drift(model, runs)
+    calm = blown(xr.zeros_like(drifting_run(waves="still")), 2.0, 0.4)
+    found = check.drift(model, {"regular": blown(REGULAR, 7.0, 0.4), "calm": calm})
     assert found.attrs["rest"] == "measured in calm"
     # A quarter of a record holds no whole periods of the wind; 0.4 m are 1.6 m per m².
     assert found.offset[0, 0] == pytest.approx(law, abs=0.1)
 
 
 def test_drift_is_probed_where_waves_train_alone():
-    def driven(run):
-        force = np.sin(tau * 3.0 * run.time.values)
-        return run.assign(force=run.eta.copy(data=force))
-
-    model = SQUARE.fit(driven(drifting_run()), ["surge"], ["eta", "force"])
-    assert check.drift(model, {"sea": driven(drifting_run())}).frequency.max() < 1.7
+    run = drifting_run()
+    run["force"] = run.eta.copy(data=np.sin(tau * 3.0 * run.time.values))
+    model = SQUARE.fit(run, ["surge"], ["eta", "force"])
+    assert check.drift(model, {"sea": run}).frequency.max() < 1.7
 
 
 def test_slow_squares_answer_by_their_filter():

@@ -10,17 +10,21 @@ from hypothesis.extra.numpy import arrays
 from loaded import loaded
 from numpy.testing import assert_allclose, assert_array_equal
 from places import ROOT
+from records import table
 from scipy.spatial.transform import Rotation
 
 from seakeep import HankelDMDc
+
+pytest.importorskip("rosbags")
+
+import stand_in_ros
+from bags import message, quaternion, write_bag
 
 EXAMPLE = ROOT / "examples/ros2_node"
 DT = 0.05
 CLOCK = 1.7e9  # seconds since 1970, as ROS counts them
 COUNT = 60
 PATIENCE = 0.3
-
-
 FOLLOWER = loaded(EXAMPLE / "follower.py")
 Follower = FOLLOWER.Follower
 
@@ -63,9 +67,10 @@ def states(found):
 def test_complete_samples_are_the_steps_of_the_live_model(model, run):
     expected, follower = model.live(), Follower(model.live)
     found = play(follower, messages(model, run, jitter=0.2))
-    for sample, (instant, state, _) in enumerate(found):
-        u, y = ([run[name].values[sample] for name in of] for of in (model.inputs, model.states))
-        assert_array_equal(state, expected.step(u, y))
+    samples = zip(table(run, model.inputs), table(run, model.states), strict=True)
+    for sample, (instant, *estimate) in enumerate(found):
+        state = expected.step(*next(samples))
+        assert_array_equal(estimate, [state, np.sqrt(np.diagonal(expected.covariance))])
         assert instant == pytest.approx(CLOCK + sample * DT, abs=0.1 * DT)
     assert len(found) == COUNT
     assert not follower.lost
@@ -117,33 +122,35 @@ def test_what_is_lost_is_estimated_and_counted(model, run):
         ("eta_cog", "missing"): 2,
         ("eta_fwd", "missing"): 1,
     }
-    measured = np.stack([run[name].values[:COUNT] for name in model.states], axis=1)
-    differs = np.any(states(found) != measured, axis=1)
+    differs = np.any(states(found) != table(run, model.states)[:COUNT], axis=1)
     assert set(np.flatnonzero(differs)) == {20, 25, 35, 40}
 
 
 @pytest.fixture
 def node(monkeypatch):
-    pytest.importorskip("rosbags")
-    import stand_in_ros
-
     stand_in_ros.install(monkeypatch)
     monkeypatch.setitem(sys.modules, "follower", FOLLOWER)
     return loaded(EXAMPLE / "node.py")
 
 
-def quaternion(angles):
-    """Of yaw, pitch and roll."""
-    from bags import message
+@pytest.fixture
+def started(node, model, tmp_path):
+    """Make a node of the model, with other parameters."""
 
-    turned = Rotation.from_euler("ZYX", angles).as_quat().tolist()
-    return message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
+    def start(**given):
+        model.save(tmp_path / "model.nc")
+        node.SeakeepNode.given = {"model": tmp_path / "model.nc"} | given
+        return node.SeakeepNode()
+
+    return start
 
 
-def recorded(path, run, samples, lost):
+def stamp(seconds):
+    return stand_in_ros.TIME(seconds).to_msg()
+
+
+def recorded(path, run, samples, lost=()):
     """Record a run as a vessel would: odometry, and two probes, messages out of order."""
-    from bags import message, write_bag
-    from stand_in_ros import TIME
 
     def point(channel, at):
         return message("geometry_msgs/msg/Point")(z=float(run[channel].values[at]))
@@ -151,7 +158,7 @@ def recorded(path, run, samples, lost):
     sent, rng = [], np.random.default_rng(0)
     for at in samples:
         seconds = CLOCK + at * DT
-        head = {"header": message("std_msgs/msg/Header")(stamp=TIME(seconds).to_msg())}
+        head = {"header": message("std_msgs/msg/Header")(stamp=stamp(seconds))}
         turned = quaternion([0.3, float(run["pitch"].values[at]), 0.02])
         pose = message("geometry_msgs/msg/Pose")(position=point("heave", at), orientation=turned)
         odometry = message("geometry_msgs/msg/PoseWithCovariance")(pose=pose)
@@ -163,46 +170,29 @@ def recorded(path, run, samples, lost):
             if (topic, at) not in lost:
                 received = round(1e9 * seconds) + int(rng.integers(80_000_000))
                 sent.append((received, topic, made))
-    write_bag(path, sorted(sent, key=lambda each: each[0]))
+    return write_bag(path, sent)
 
 
-def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
+def test_the_node_follows_a_recorded_bag(node, started, model, make_run, tmp_path):
     run = make_run(seed=5).assign_attrs(water_depth=3.0)
     for name, place in (("eta_fwd", -1.0), ("eta_cog", 0.0)):
         run[name].attrs["x_position"] = place
     run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
-    model.save(tmp_path / "model.nc")
     lost = {("/wave_probe/fwd", 50), ("/vessel/odometry", 60), ("/vessel/odometry", 61)}
-    recorded(tmp_path / "first", run, range(240), lost)
-    recorded(tmp_path / "second", run, range(240, 300), ())
-    names = ("model", "run", "state")
-    node.SeakeepNode.given = {name: str(tmp_path / f"{name}.nc") for name in names}
-    vessel = node.SeakeepNode()
-    vessel.play(tmp_path / "first")
-
+    vessel = started(run=tmp_path / "run.nc")
+    vessel.play(recorded(tmp_path / "bag", run, range(240), lost))
     estimates = vessel.published["~/estimate"]
     assert len(estimates) > 230
     for at, each in enumerate(estimates):
-        stamp = each.header.stamp.sec + 1e-9 * each.header.stamp.nanosec
-        assert stamp == pytest.approx(CLOCK + at * DT, abs=1e-6)
+        assert node.seconds(each.header.stamp) == pytest.approx(CLOCK + at * DT, abs=1e-6)
         assert list(each.name) == model.states
         if at not in (60, 61):
-            measured = [float(run[name].values[at]) for name in model.states]
+            measured = table(run, model.states)[at]
             assert_allclose(each.position, measured, atol=1e-12)  # via a quaternion
-    forecast = vessel.published["~/forecast"][-1]
-    assert list(forecast.joint_names) == model.states
-    assert len(forecast.points) == round(10.0 / DT)
-    assert np.all(np.isfinite([each.positions for each in forecast.points]))
     assert vessel.warnings == [
         "lost in the last 10 s: eta_fwd missing: 1, heave missing: 2, pitch missing: 2"
     ]
     assert vessel.follower.live.forecast(2).attrs["predictable"] > 0  # it serves in this rig
-
-    again = node.SeakeepNode()  # from the state that the first one saved in its last second
-    again.play(tmp_path / "second")
-    first = again.published["~/estimate"][0].header.stamp
-    assert first.sec + 1e-9 * first.nanosec <= CLOCK + 241 * DT
-    assert np.all(np.isfinite(again.published["~/estimate"][-1].position))
 
 
 @pytest.mark.parametrize("turn", [(0.4, -0.2, 0.7), (0.0, np.pi / 2, 0.0), (-3.0, 0.1, 3.1)])
@@ -213,52 +203,37 @@ def test_angles_of_a_quaternion(node, turn):
     assert_allclose(found, turned, atol=1e-7)
 
 
-ODD = {
-    "NaN": {"w": np.nan},
-    "zero": {"w": 0.0},
-    "too long": {"w": 1.02},
-    "absent by its covariance": {"w": 1.0},
-}
-
-
-@pytest.mark.parametrize("odd", ODD)
-def test_an_orientation_or_a_rate_that_is_not_there_is_missing(node, odd):
-    from bags import message
-
-    turn = message("geometry_msgs/msg/Quaternion")(**ODD[odd])
-    absent = [-1.0] + [0.0] * 8 if "covariance" in odd else [0.0] * 9
+@pytest.mark.parametrize(("w", "covariance"), [(np.nan, 0.0), (0.0, 0.0), (1.02, 0.0), (1.0, -1.0)])
+def test_an_orientation_or_a_rate_that_is_not_there_is_missing(node, w, covariance):
+    """By its length, or its covariance."""
+    turn, absent = message("geometry_msgs/msg/Quaternion")(w=w), [covariance] * 9
     imu = message("sensor_msgs/msg/Imu")(
         orientation=turn, orientation_covariance=absent, angular_velocity_covariance=absent
     )
     assert all(np.isnan(node.read(imu, ["orientation", angle])) for angle in node.ANGLES)
-    assert np.isnan(node.read(imu, ["angular_velocity", "x"])) == ("covariance" in odd)
+    assert np.isnan(node.read(imu, ["angular_velocity", "x"])) == (covariance == -1)
     assert node.read(imu, ["linear_acceleration", "z"]) == 0.0
 
 
-def test_deviations_and_validity_are_those_of_the_live_model(node, model, run, tmp_path):
-    model.save(tmp_path / "model.nc")
-    steep = run.copy()
-    for name in model.inputs:
-        steep[name] = 3 * run[name]
-    unseen = {60, *range(225, 240)}
-    recorded(tmp_path / "bag", steep, range(240), {("/vessel/odometry", at) for at in unseen})
-    node.SeakeepNode.given = {"model": str(tmp_path / "model.nc")}
-    vessel = node.SeakeepNode()
-    vessel.play(tmp_path / "bag")
-    deviations = np.array([each.position for each in vessel.published["~/estimate_std"]])
-    assert len(deviations) == len(vessel.published["~/estimate"])
-    later = deviations[model.history_samples :].all(axis=1)
-    at = set(np.flatnonzero(later) + model.history_samples)
-    assert at == unseen & set(range(len(deviations)))
-    covariance = vessel.follower.live.covariance
-    assert_allclose(deviations[-1], np.sqrt(np.diagonal(covariance)))
+def assert_sent(trajectory, forecast, model, statistic, atol=0.0):
+    found = [each.positions for each in trajectory.points]
+    expected = table(forecast.sel(statistic=statistic), model.states)
+    assert_allclose(found, expected, rtol=1e-7, atol=atol)
+
+
+def test_deviations_and_validity_are_those_of_the_live_model(started, model, run, tmp_path):
+    steep = run.assign({name: 3 * run[name] for name in model.inputs})
+    unseen = {("/vessel/odometry", at) for at in range(225, 240)}
+    vessel = started()
+    vessel.play(recorded(tmp_path / "bag", steep, range(240), unseen))
     vessel.forecast()
     live, found = vessel.follower.live, vessel.published
+    deviation = np.sqrt(np.diagonal(live.covariance))
+    assert_array_equal(found["~/estimate_std"][-1].position, deviation)
     expected = live.forecast(200)
     for topic, statistic in (("~/forecast", "mean"), ("~/forecast_std", "std")):
-        rows = [each.positions for each in found[topic][-1].points]
-        wanted = expected[model.states].sel(statistic=statistic).to_array().values.T
-        assert_allclose(rows, wanted)
+        assert_sent(found[topic][-1], expected, model, statistic)
+    assert list(found["~/forecast"][-1].joint_names) == model.states
     (status,) = found["/diagnostics"][-1].status
     assert (status.level, status.message) == (1, expected.attrs["validity"])
     assert "height" in status.message
@@ -266,49 +241,38 @@ def test_deviations_and_validity_are_those_of_the_live_model(node, model, run, t
     assert [float(each.value) for each in status.values] == pytest.approx(free, rel=0.01)
 
 
-def test_a_known_input_is_forecast_by_its_plan(node, model, run, tmp_path, monkeypatch):
-    from bags import message
-    from stand_in_ros import TIME
-
-    model.save(tmp_path / "model.nc")
-    recorded(tmp_path / "bag", run, range(120), ())
+def test_a_known_input_is_forecast_by_its_plan(node, started, model, run, tmp_path, monkeypatch):
     monkeypatch.setitem(node.ROLES, "eta_cog", "known")
-    node.SeakeepNode.given = {"model": str(tmp_path / "model.nc"), "horizon": 1.0}
-    vessel = node.SeakeepNode()
-    vessel.play(tmp_path / "bag")
+    vessel = started(horizon=1.0)
+    vessel.play(recorded(tmp_path / "bag", run, range(120)))
     (status,) = vessel.published["/diagnostics"][-1].status
     assert (status.level, status.message) == (1, "no forecast: ~/plan must give eta_cog")
     assert "~/forecast" not in vessel.published
 
-    live = vessel.follower.live
-    head = message("std_msgs/msg/Header")(stamp=TIME(live.time).to_msg())
-    point, after = message("trajectory_msgs/msg/JointTrajectoryPoint"), [0.0, 0.5]
-    points = [
-        point(positions=[0.2 * at], time_from_start=TIME(at).to_msg()) for at in after
-    ]  # a Duration has the fields of a Time
-    vessel.receive_plan(
-        message("trajectory_msgs/msg/JointTrajectory")(
-            header=head, joint_names=["eta_cog"], points=points
-        )
-    )
+    live, point = vessel.follower.live, message("trajectory_msgs/msg/JointTrajectoryPoint")
+    points = [point(positions=[0.2 * at], time_from_start=stamp(at)) for at in (0.0, 0.5)]
+    plan = message("trajectory_msgs/msg/JointTrajectory")(joint_names=["eta_cog"], points=points)
+    plan.header.stamp = stamp(live.time)
+    vessel.receive_plan(plan)
     vessel.forecast()
     leads = DT * np.arange(1, 20 + model.lead_samples)
     expected = live.forecast(20, {"eta_cog": 0.2 * np.minimum(leads, 0.5)})
-    rows = [each.positions for each in vessel.published["~/forecast"][-1].points]
-    wanted = expected[model.states].sel(statistic="mean").to_array().values.T
-    assert_allclose(rows, wanted, atol=1e-6)  # stamps count ns, and a float of 1.7e9 s has 0.2 µs
+    # Stamps count ns, and a float of 1.7e9 s has 0.2 µs.
+    assert_sent(vessel.published["~/forecast"][-1], expected, model, "mean", atol=1e-6)
 
 
-def test_a_damaged_state_is_put_aside(node, model, run, tmp_path):
-    model.save(tmp_path / "model.nc")
-    recorded(tmp_path / "bag", run, range(120), ())
-    live, state = model.live(), tmp_path / "state.nc"
-    live.save(state)
-    damaged = state.read_bytes()[: state.stat().st_size // 2]
-    state.write_bytes(damaged)
-    node.SeakeepNode.given = {"model": str(tmp_path / "model.nc"), "state": str(state)}
-    vessel = node.SeakeepNode()
-    assert state.with_suffix(".damaged").read_bytes() == damaged
+def test_a_damaged_state_is_put_aside_and_the_next_one_is_gone_on_from(
+    node, started, run, tmp_path
+):
+    state = tmp_path / "state.nc"
+    state.write_bytes(b"cut off")
+    vessel = started(state=state)
+    assert state.with_suffix(".damaged").read_bytes() == b"cut off"
     assert "starting anew" in vessel.warnings[0]
-    vessel.play(tmp_path / "bag")
-    assert node.SeakeepNode().follower.live.time == pytest.approx(CLOCK + 119 * DT, abs=1.5)
+    vessel.play(recorded(tmp_path / "first", run, range(120)))
+    again = started(state=state)
+    saved = again.follower.live.time
+    assert saved == pytest.approx(CLOCK + 119 * DT, abs=1.5)
+    again.play(recorded(tmp_path / "second", run, range(120, 180)))
+    first = again.published["~/estimate"][0].header.stamp
+    assert node.seconds(first) == pytest.approx(saved + DT, abs=1e-6)

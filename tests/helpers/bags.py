@@ -3,6 +3,7 @@
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 
@@ -28,11 +29,17 @@ def message(kind):
     return made
 
 
+def quaternion(angles):
+    """Message of yaw, pitch and roll."""
+    turned = Rotation.from_euler("ZYX", angles).as_quat().tolist()
+    return message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
+
+
 def write_bag(path, sent, plugin=StoragePlugin.MCAP):
-    """Write messages, each with the instant of its reception in ns and its topic."""
+    """Write messages of any order, each with the instant of its reception in ns and its topic."""
     topics = {}
     with Writer(path, version=9, storage_plugin=plugin) as writer:
-        for received, topic, message in sent:
+        for received, topic, message in sorted(sent, key=lambda each: each[:2]):
             kind = message.__msgtype__
             if topic not in topics:
                 topics[topic] = writer.add_connection(topic, kind, typestore=STORE)

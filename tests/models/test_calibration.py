@@ -140,8 +140,9 @@ def pooled(train_on, runs, window=None):
     return few(window=window, n_members=6, train_on=train_on, **NOISY).fit(runs, STATES, INPUTS)
 
 
-def assert_learnt(found, judged):
-    """Margin and floor are those of errors that were judged by hand."""
+def assert_learnt(found, *by_hand):
+    """Margin and floor are those of errors of runs, each judged by an ensemble."""
+    judged = [held_out({"run": pair}, 40, 0.95)["run"] for pair in by_hand]
     expected, floor, _ = learn_margin(judged, 0.95, "spread")
     assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
     assert_allclose(found.floor, floor, rtol=1e-9)
@@ -154,15 +155,9 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
         ensemble.calibrate(runs, steps=40)
     found = ensemble.calibrate(runs, steps=40, folds="run").calibration
     # By hand: the same settings fitted anew on the other runs, which none of them has read.
-    judged = [
-        held_out(
-            {name: (pooled("all", {key: each for key, each in runs.items() if key != name}), run)},
-            40,
-            0.95,
-        )[name]
-        for name, run in runs.items()
-    ]
-    assert_learnt(found, judged)
+    others = [{key: runs[key] for key in runs if key != name} for name in runs]
+    taught = [pooled("all", each) for each in others]
+    assert_learnt(found, *zip(taught, runs.values(), strict=True))
     assert found.folds == "run"
     assert found.windows == dict.fromkeys(runs, (500 - ensemble.history_samples) // 40)
     # A run that none has read is forecast by all.
@@ -173,16 +168,12 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
 
 def test_a_run_that_repeats_the_judged_one_does_not_train():
     """As in fit and study; where every run repeats it, the others are what there is."""
-    runs = {"a": sea(0, 500, "a"), "b": sea(1, 500, "b"), "c": sea(1, 500, "c")}
-    noise = 0.01 * np.random.default_rng(0).normal(size=500)
-    runs["c"] = runs["c"].assign(heave=runs["c"]["heave"] + noise)
-    alone = pooled("all", {"a": runs["a"]})
-    found = pooled("all", runs).calibrate({"b": runs["b"]}, 40, folds="run").calibration
-    assert_learnt(found, [held_out({"b": (alone, runs["b"])}, 40, 0.95)["b"]])
-    twice = {name: runs[name] for name in "bc"}
-    found = pooled("all", twice).calibrate({"b": runs["b"]}, 40, folds="run").calibration
-    repeat = pooled("all", {"c": runs["c"]})
-    assert_learnt(found, [held_out({"b": (repeat, runs["b"])}, 40, 0.95)["b"]])
+    runs = {name: sea(seed, 500, name) for name, seed in (("a", 0), ("b", 1), ("c", 1))}
+    runs["c"]["heave"] += 0.01 * np.random.default_rng(0).normal(size=500)
+    for names, taught in (("abc", "a"), ("bc", "c")):
+        ensemble = pooled("all", {name: runs[name] for name in names})
+        found = ensemble.calibrate({"b": runs["b"]}, 40, folds="run").calibration
+        assert_learnt(found, (pooled("all", {taught: runs[taught]}), runs["b"]))
 
 
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
@@ -202,9 +193,8 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
     for begin, end in ((0, 300), (300, 600), (600, 900)):
         rest = {"before": run.isel(time=slice(0, begin)), "after": run.isel(time=slice(end, None))}
         ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
-        part = run.isel(time=slice(begin, end))
-        judged.append(held_out({"part": (ensemble, part)}, 40, 0.95)["part"])
-    assert_learnt(found, judged)
+        judged.append((ensemble, run.isel(time=slice(begin, end))))
+    assert_learnt(found, *judged)
     count = (300 - ensemble.history_samples) // 40
     assert found.windows == {f"a, part {number}": count for number in (1, 2, 3)}
 

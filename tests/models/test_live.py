@@ -238,16 +238,13 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
 
 
 def test_no_claim_exceeds_what_errors_of_late_and_departures_allow(model, drift, monkeypatch):
-    loud = drift.copy(deep=True)
-    for name in STATES:
-        loud[name].values *= 1.5
+    loud = drift.assign({name: 1.5 * drift[name] for name in STATES})
     live, of_late = started(model, loud), np.ones((2, len(STATES)))
     monkeypatch.setattr(type(live), "consistency_by_state", of_late)
     calm = driven(live, loud)
     scale = model.signature.state_scale
     away = table(loud, STATES)[:START] - scale.centre
     usual = np.maximum(scale.spread**2, np.mean(away**2, axis=0))
-    assert np.all(usual > 1.5 * scale.spread**2)
     most = np.sqrt(usual + (mean(calm) - scale.centre) ** 2)
     assert np.all(1e3 * std(calm)[-1] > most[-1])
     of_late[0] = 1e6  # one step ahead alone
@@ -332,14 +329,12 @@ def test_filled_waves_drive_no_free_run(model, waves, motions):
 
 
 def test_waves_that_were_filled_from_few_samples_judge_nothing(model, waves, motions):
-    begins, sound, holed = model.history_samples, model.live(), model.live()
+    begins, live = model.history_samples, model.live()
     for at in range(2 * begins + 20):
-        sound.step(waves[at], motions[at])
-        holed.step(None if at == 5 else waves[at], motions[at])
-        one_step = holed.consistency_by_state[0]
+        live.step(None if at == 5 else waves[at], motions[at])
+        one_step = live.consistency_by_state[0]
         assert np.isnan(one_step).any() or at > begins + 5
-    late = [each.consistency_by_state[0] for each in (sound, holed)]
-    assert np.all(np.isfinite(late))
+    assert np.all(np.isfinite(one_step))
 
 
 @pytest.mark.parametrize("value", [9.97e36, 1e200])

@@ -93,14 +93,11 @@ def test_several_probes_without_positions_are_not_compared_with_the_vessel():
 
 
 def test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told():
-    run = moored_run(2)
-    damper = run["eta"].shift(time=5, fill_value=0.0).assign_attrs(units="N")
-    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(
-        run.assign(damper=damper), ["heave"], ["eta", "damper"]
-    )
-    checked = check_model(model, {"run": run.assign(damper=damper)})
-    sections = {each.key: each for each in check_sections(checked)}
-    assert "inputs (damper) are at their means" in " ".join(sections["response"].words)
+    run, inputs = moored_run(2), ["eta", "mooring_bow"]
+    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], inputs)
+    checked = check_model(model, {"run": run})
+    response = check_sections(checked)[1]
+    assert "inputs (mooring_bow) are at their means" in " ".join(response.words)
     found = checked.results["statistics"]
     sides = ["extreme_chance", "trough_chance"]
     for side in sides:
@@ -108,5 +105,4 @@ def test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told():
             fits = found.assign(1.0 + 0 * found[sides])
             fits[side] *= chance
             shown = check_sections(Checked({"statistics": fits}, {}, {}))
-            (section,) = (each for each in shown if each.key == "statistics")
-            assert len(section.points) == told
+            assert sum(len(each.points) for each in shown) == told
