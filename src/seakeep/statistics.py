@@ -99,10 +99,10 @@ def moving_block_bootstrap(
     whole = whole[channel_names(whole, "series")]
     for name, channel in whole.items():
         finite(channel.transpose("time", ...).values, f"channel '{name}'")
-    positions = bootstrap.bootstrap_indices(
-        whole.sizes["time"], n_series, block_length, rng, segments
+    at = xr.DataArray(
+        bootstrap.bootstrap_indices(whole.sizes["time"], n_series, block_length, rng, segments),
+        dims=("draw", "time"),
     )
-    at = xr.DataArray(positions, dims=("draw", "time"))
     drawn = whole.drop_vars("time", errors="ignore").isel(time=at)
     if "time" in whole.coords:
         drawn = drawn.assign_coords(time=whole["time"])
@@ -185,13 +185,12 @@ def coverage_table(
         alone = xr.Dataset({first: waves.assign_attrs(units="")})
         heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]
     shares = bands.coverage_table(**pairs.arrays, level=level, waves=heights)
-    dims = {"instants": ("part",)}
-    table = xr.Dataset(
+    return xr.Dataset(
         {
-            key: (dims.get(key, ("part", "channel")), values)
+            key: (("part", "channel")[: np.ndim(values)], values)
             for key, values in vars(shares).items()
             if key != "parts"
         },
         coords={"part": list(shares.parts), **_channels(pairs.names, measured)},
+        attrs={"level": level},
     )
-    return table.assign_attrs(level=level)

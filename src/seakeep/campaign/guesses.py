@@ -186,11 +186,11 @@ def seas_of(files: Files, guesses: Guesses, wave: Guess) -> tuple[dict[str, Sea]
     odd = {}
     if len(falling) > 2:  # of two, none is the odd one
         first, second, *_ = falling
-        beyond, steep = second.height <= STILL * first.height, (second.period / first.period) ** 2
-        if beyond and steep * first.height < AS_STEEP * second.height:
+        alike = first.height / first.period**2 < AS_STEEP * second.height / second.period**2
+        if alike and second.height <= STILL * first.height:
             odd[first.group] = first.height / float(np.median([s.height for s in falling[1:]]))
-    highest = max((sea.height for sea in falling if sea.group not in odd), default=0.0)
-    seas = {f: s for f, s in seas.items() if f.run not in odd and s.height > STILL * highest}
+    highest = falling[len(odd)].height if falling else 0.0
+    seas = {f: s for f, s in seas.items() if STILL * highest < s.height <= highest}
     rate = min((file.rate or 1.0 for file in seas), default=1.0)
     records = {}
     for file in seas:
@@ -368,13 +368,13 @@ def _guess(column: str, files: Files) -> Guess:
         return Guess(column, header, "-", "nobody", why="pulses of a trigger")
     name, unit = column, next(iter(stated), None)
     stated_by: Literal["files", "some", "name", "nobody"] = "files"
-    if unit is not None and len(stated) < len(files) and all(same_unit(unit, u) for u in stated):
-        stated_by = "some"
     if unit is None:
         bare, named = named_unit(column)
         stated_by = "nobody"
         if named and si_unit(named) != "s":  # "Tension_s" is a side, and no time
             name, unit, stated_by = bare, named, "name"
+    elif len(stated) < len(files) and all(same_unit(unit, u) for u in stated):
+        stated_by = "some"
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"

@@ -187,15 +187,14 @@ class LiveChain:
         steps = np.diff(times)
         # Seconds of day count on after midnight, where no more than a window was lost there.
         past = (steps < 0) & (steps % DAY <= self.window)
-        days = np.cumsum([0.0, *np.where(past, -(steps // DAY), 0.0)])
-        steps = np.where(past, steps % DAY, steps)
-        if not np.all(steps > 0) or not np.all(np.isfinite(times)):
+        counted = times - DAY * np.cumsum([0.0, *np.where(past, steps // DAY, 0.0)])
+        if not np.all(np.diff(counted) > 0) or not np.all(np.isfinite(times)):
             raise RequestError(
                 f"the instants of '{key}' do not increase: "
                 f"{', '.join(f'{each:g}' for each in times[:4])} … s. Send each row once, in order."
             )
         if past.any():
-            arrays[name] = arrays[name] + DAY / factor * days[last.size :]
+            arrays[name] = counted[last.size :] / factor
         return arrays
 
     def _instants(self, key: str, table: Mapping[str, FloatArray]) -> FloatArray:

@@ -169,8 +169,7 @@ class Run:
     @property
     def size(self) -> int:
         """Bytes of its columns."""
-        columns = [each.columns.values for each in self.loggers.values()]
-        return sum(values.nbytes for own in columns for values in own.values())
+        return sum(x.nbytes for each in self.loggers.values() for x in each.columns.values.values())
 
     def span(self, key: str) -> tuple[float, float] | None:
         """Start and end (s) that a key of the run's table states."""
@@ -315,8 +314,8 @@ def _holder(run: Run, name: str, own: ChannelSettings) -> str:
 def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    is_reference = logger.name == next(iter(run.loggers))
-    slack = usual_step(time) * (1 + 1e-6) if is_reference else np.inf
+    # The reference's record is the run's own.
+    slack = usual_step(time) * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
     span, whole = run.span("record") or (-np.inf, np.inf), (time[0], time[-1])
     records = _part(f"runs.{run.name}.record", span, time, whole, slack)
     variables = {}
@@ -604,8 +603,7 @@ def cropped(run: Run) -> Run:
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     step = (record[1] - record[0]) / (reference.size - 1)
     slack = max(usual_step(time), step) * (1 + 1e-6)
-    stated = {key: run.span(key) for key in ("span", "train", "test")}
-    spans = {key: span for key, span in stated.items() if span}
+    spans = {key: span for key in ("span", "train", "test") if (span := run.span(key))}
     parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
     if "span" in parts:
         data = data.isel(time=parts.pop("span"))
@@ -636,12 +634,6 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
         if own.sampling_rate
     }
     channels = run.channels
-    units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
-    waves = {
-        name: each.column
-        for name, each in channels.items()
-        if each.column and name.partition("_")[0] in MOTIONS and is_wave(each.column)
-    }
     record = Record(
         run=run.name,
         whole=run.data,
@@ -653,8 +645,14 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
         stated_period=settings.campaign.encounter_period,
         redundant=redundant_pairs(settings, run.period),
         rates=rates,
-        assumed_units=units,
-        wave_columns=waves,
+        assumed_units={
+            name: each.unit or "-" for name, each in channels.items() if each.unit_assumed
+        },
+        wave_columns={
+            name: each.column
+            for name, each in channels.items()
+            if each.column and name.partition("_")[0] in MOTIONS and is_wave(each.column)
+        },
         bridged=preparation.longest_gap if preparation.gaps == "bridge" else None,
         anti_alias=preparation.anti_alias,
         left_out=left_out,
@@ -674,8 +672,9 @@ def _part(
     Refused is also a span that reaches beyond the reference's record by more than a slack.
     """
     dt = usual_step(time)
-    finite = [edge for edge in span if np.isfinite(edge)]
-    outside = any(not record[0] - slack <= edge <= record[1] + slack for edge in finite)
+    outside = any(
+        np.isfinite(edge) and not record[0] - slack <= edge <= record[1] + slack for edge in span
+    )
     used = inside(time, span, dt)
     if (count := used.sum()) > 1 and not outside:
         return used

@@ -117,10 +117,9 @@ class Campaign:
             mend = f"Name one of {', '.join(models)}." if models else "Add [model] with 'states'."
             raise RequestError(f"{self.path} has no table [model]. {mend}")
         if name not in models:
-            listed = ", ".join(models) or "none"
             raise RequestError(
                 f"{self.path} has no table [models.{name}].{did_you_mean(name, models)} "
-                f"Named models: {listed}."
+                f"Named models: {', '.join(models) or 'none'}."
             )
         return models[name]
 
@@ -412,8 +411,7 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = cropped(resampled(run, dt))
-                run = checked(run, surveyed.left_out)
+                run = checked(cropped(resampled(run, dt)), surveyed.left_out)
                 warn_of(run.findings, reported)
                 data = run.data
                 data.attrs["quality"] = as_json(run.findings)

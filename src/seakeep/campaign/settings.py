@@ -539,8 +539,8 @@ class CampaignSettings(Table):
 
     def all_models(self) -> dict[str, ModelSettings]:
         """Models by the key of their table: ``model`` and ``models.NAME``."""
-        unnamed = {"model": self.model} if self.model else {}
-        return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
+        named = {f"models.{name}": each for name, each in self.models.items()}
+        return {"model": self.model, **named} if self.model else named
 
 
 def long_name_of(name: str, stated: str | None) -> str:
@@ -567,10 +567,9 @@ def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None =
     try:
         return list(TopologicalSorter(graph).static_order())
     except CycleError as error:
-        shown = " -> ".join(reversed(error.args[1]))
         raise RequestError(
-            f"derived channels need one another in a circle: {shown}. Make one of them from "
-            "measured channels."
+            "derived channels need one another in a circle: "
+            f"{' -> '.join(reversed(error.args[1]))}. Make one of them from measured channels."
         ) from None
 
 
@@ -604,9 +603,11 @@ def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
     used = {logger for run in settings.runs.values() for logger in run.files}
     reference = settings.instruments.reference
     if reference is not None and reference not in {*known, *used}:
-        near = did_you_mean(reference, sorted(used))
-        words = f"received {reference!r}, which no run has a file of.{near}"
-        yield ("instruments", "reference"), words
+        yield (
+            ("instruments", "reference"),
+            f"received {reference!r}, which no run has a file of."
+            f"{did_you_mean(reference, sorted(used))}",
+        )
     for run, each in settings.runs.items():
         for logger in each.files:
             if known and logger not in known:
@@ -635,9 +636,8 @@ def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
 def span_mistakes(settings: CampaignSettings, period: float) -> Iterable[Mistake]:
     """Spans of which one end counts in periods, and which run backwards with a period (s)."""
     for run, each in settings.runs.items():
-        spans = {"record": each.record, "span": each.span, "train": each.train, "test": each.test}
-        for key, span in spans.items():
-            if span is None:
+        for key in ("record", "span", "train", "test"):
+            if (span := getattr(each, key)) is None:
                 continue
             start, end = (in_seconds(edge, period) for edge in span)
             if not start < end:
@@ -664,8 +664,11 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     for place, name in wanted:
         if name not in names:
             received = "" if place[-1] == name else f"received {name!r}, "
-            near = did_you_mean(name, names)
-            yield place, f"{received}no such channel.{near} Channels: {', '.join(names)}."
+            yield (
+                place,
+                f"{received}no such channel.{did_you_mean(name, names)} "
+                f"Channels: {', '.join(names)}.",
+            )
 
 
 def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -726,10 +729,10 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         key = "expression" if each.expression is not None else "from"
         for source in sources:
             if source not in names:
-                near = did_you_mean(source, names)
                 yield (
                     (*place, key),
-                    f"the channel '{source}' does not exist.{near} Channels: {', '.join(names)}.",
+                    f"the channel '{source}' does not exist.{did_you_mean(source, names)} "
+                    f"Channels: {', '.join(names)}.",
                 )
         if each.expression is not None and each.unit is None and canonical_channel(name) is None:
             yield (

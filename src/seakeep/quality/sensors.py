@@ -183,7 +183,7 @@ def positions(record: Record) -> Findings:
         for name, channel in channels_of(run).items()
         if "x_position" in channel.attrs and noise_share(sound(run, name)) <= 0.5
     }
-    if depth is None or record.waves in ("regular", "still") or len(places) < 2:
+    if depth is None or record.waves in ("regular", "still"):
         return
     series = {name: filled(run[name]) for name in places}
     for each in misplaced_probes(series, places, step_of(run), depth):

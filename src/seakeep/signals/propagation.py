@@ -529,8 +529,9 @@ def _carried(
     period = 1.0 / max(band_limit(flat, 1.0, 0.5), 2.0 / len(flat))
     whole, order = math.ceil(delay + period), min(math.ceil(2.0 * period), 500)
     padding, fitted = whole + math.ceil(4.0 * period), max(8 * order, 64)
-    how = (padding, fitted, order, whole)
-    extended = np.apply_along_axis(predicted_extension, 0, flat - mean, *how)
+    extended = np.apply_along_axis(
+        predicted_extension, 0, flat - mean, padding, fitted, order, whole
+    )
     size = fft.next_fast_len(len(extended), real=True)
     spectrum = fft.rfft(extended, n=size, axis=0)
     k = numbers(2 * np.pi * fft.rfftfreq(size, step))

@@ -366,8 +366,7 @@ def wave_heights(series: ArrayLike, dt: float) -> FloatArray:
     """
     x = as_series(series)
     edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
-    waves = [x[first:last] for first, last in pairwise(edges)]
-    return np.array([np.ptp(wave) for wave in waves], float)
+    return np.array([np.ptp(x[first:last]) for first, last in pairwise(edges)], float)
 
 
 def wave_spectrum(
@@ -721,8 +720,7 @@ def find_leakage(
             height, phase = float(np.abs(match[at])), float(np.angle(match[at]))
             if height >= REPEATED:
                 repeated[start : start + length] = True
-                begin = (part.start + start) * step
-                found.append((height, index, at * step, begin, phase))
+                found.append((height, index, at * step, (part.start + start) * step, phase))
     best = max(found, key=lambda each: each[0], default=None)
     return best and Leakage(float(repeated.mean()), *best)
 
