@@ -184,8 +184,8 @@ class ProbeAlignment:
         labelled.check_channels(first, inputs, first_name)
         if self.optional and self.missing(runs, states, inputs):
             still = replace(self, surge="none")  # for probes that stand elsewhere in other runs
-            missing = still.missing(runs, states, inputs)
-            return None if missing else still.fit(runs, states, inputs, window)
+            given = runs, states, inputs
+            return None if still.missing(*given) else still.fit(*given, window)
         carried = _elevations(self, first, inputs)
         if self.surge == "predicted" and self.surge_channel not in states:
             raise RequestError(
@@ -196,7 +196,7 @@ class ProbeAlignment:
         depth, dt = _common_depth(runs), labelled.run_step(first, first_name)
         celerity = None if self.celerity == "common" else self.celerity
         limit = None
-        elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
+        elevations = [*compress(inputs, carried)]
         if self.mode == "dispersion":
             if depth is None:
                 raise RequestError(
@@ -293,16 +293,15 @@ class FittedAlignment:
     @property
     def placed(self) -> tuple[int, ...]:
         """Elevations at stated positions, by their places among the inputs."""
-        every = enumerate(zip(self.carried, self.positions, strict=True))
-        return tuple(column for column, (yes, at) in every if yes and at is not None)
+        carried = np.flatnonzero(self.carried).tolist()
+        return tuple(column for column in carried if self.positions[column] is not None)
 
     def look_ahead(self, run: xr.Dataset) -> float:
         """Time that the slowest waves take over the constant distance they are carried upstream, s.
 
         A surge upstream reads nothing more: the record is continued by linear prediction there.
         """
-        places = zip(self.rig(run).offsets, self.carried, strict=True)
-        farthest = min(distance for distance, yes in places if yes)
+        farthest = min(compress(self.rig(run).offsets, self.carried))
         return max(0.0, -farthest) / self._speed(run)
 
     def celerity_of(self, run: xr.Dataset) -> float | None:
@@ -364,10 +363,6 @@ class FittedAlignment:
             for here, trained in zip(places, self.positions, strict=True)
         ]
         return Rig(tuple(offsets), places, math.nan if depth is None else float(depth))
-
-    def carries_in(self, run: xr.Dataset) -> bool:
-        """Whether waves are carried at all in a run."""
-        return self.settings.carries or any(self.rig(run).offsets)
 
     def carry(self, run: xr.Dataset, spans: Sequence[Span]) -> FloatArray:
         """Inputs of a run, elevations carried to the vessel where spans read them.
@@ -705,8 +700,9 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
         own = rig.positions[column]
         columns = [column] if own is None else list(aligned.placed)
         targets = following.place.grid + rig.offsets[column] + (own or 0.0)
-        leads = np.full(len(targets), following.lead)
-        taps, errors = following._carriers(rig, columns, targets, following.ahead, leads)
+        taps, errors = following._carriers(
+            rig, columns, targets, following.ahead, np.full(len(targets), following.lead)
+        )
         if errors[following._known].min() > REACH:
             raise RequestError(
                 f"the probe of '{aligned.inputs[column]}' stands {rig.offsets[column]:+.3g} m from "
@@ -726,8 +722,8 @@ def _lines(following: Following, rig: Rig, places: tuple[float, ...]) -> FloatAr
     targets = np.repeat(places, 3) + rig.offsets[last] + (rig.positions[last] or 0.0)
     taps, _ = following._carriers(rig, placed, targets, following.ahead, leads)
     before, now, after = taps.reshape(len(places), 3, *taps.shape[1:]).swapaxes(0, 1)
-    filters = np.stack([now, (after - before) / (2.0 * following.dt)], axis=1)
-    return filters.reshape(-1, *taps.shape[1:])
+    rate = (after - before) / (2.0 * following.dt)
+    return np.stack([now, rate], axis=1).reshape(-1, *taps.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)

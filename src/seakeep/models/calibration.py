@@ -159,13 +159,12 @@ def calibrate(
     progress: Progress | None,
 ) -> Calibration:
     """Find the band of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
-    named = labelled.as_runs(runs)
     level = fraction(level, "level")
     check_choice("scale", scale, get_args(BandScale))
-    if not (folds is None or (isinstance(folds, str) and folds == "run")):
+    if folds not in (None, "run"):
         raise RequestError(f"folds must be 'run', or None for unread windows; received {folds!r}.")
     cases: dict[str, Case] = {}
-    for name, run in named.items():
+    for name, run in labelled.as_runs(runs).items():
         known = _read_run(ensemble, name, run) if folds else None
         if known is None:
             cases[name] = ensemble, run
@@ -281,8 +280,8 @@ def held_out(
 def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
     """Members as they learn from runs of other waves; from all other runs where none has others."""
     arrays, signature, alike = ensemble.arrays, ensemble.signature, [run]
-    if waves := [*map(is_elevation, signature.inputs)]:
-        at = waves.index(max(waves))  # the first elevation, if there is one
+    if signature.inputs:
+        at = np.argmax([*map(is_elevation, signature.inputs)])  # the first elevation, if any
         records = {n: x[:, at] for n, x in zip(arrays.names, arrays.delayed, strict=True)}
         groups = repeated_waves(records, signature.dt)
         alike = [name for name in records if groups[name] == groups[run]]

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any, Literal
 
 import numpy as np
@@ -380,7 +381,7 @@ def _part(model: HankelDMDcModel, run: xr.Dataset, span: tuple[float, float]) ->
 def _half_wavelengths(model: HankelDMDcModel, part: xr.Dataset) -> tuple[float, float]:
     alignment = model.alignment
     assert alignment is not None
-    channel = next(c for c, yes in zip(model.inputs, alignment.carried, strict=True) if yes)
+    channel = next(compress(model.inputs, alignment.carried))
     period = encounter_period(part[channel].values, model.dt)
     depth = part.attrs.get("water_depth", alignment.water_depth)
     speed = alignment.celerity_of(part)

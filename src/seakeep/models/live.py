@@ -224,8 +224,8 @@ class Live:
         self._follows = signature.input_map.follows
         # In service only a model that follows its own surge carries waves, in this rig.
         self._own_rig = None if self._follows is None else self._rig
-        aligned = signature.input_map.alignment
-        if aligned is not None and self._follows is None and aligned.carries_in(self._rig):
+        aligned = signature.input_map.alignment if self._follows is None else None
+        if aligned and (aligned.settings.carries or any(aligned.rig(self._rig).offsets)):
             raise RequestError(
                 "the model is driven by waves that are carried over whole records, which are not "
                 "there in service. Fit it with alignment mode = 'dispersion', surge = 'predicted', "
@@ -563,7 +563,7 @@ class Live:
         """Covariance and gain of a sample."""
         count, scale, kalman = self._count, self.signature.state_scale, self._filter
         count.unseen = 0 if seen.any() else count.unseen + 1
-        count.partly = count.partly or bool(seen.any())
+        count.partly |= bool(seen.any())
         is_exact = bool(seen.all()) and not self._noise.any()
         update = None
         if not is_exact or count.since or at < self._begins:
@@ -675,13 +675,13 @@ class Live:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
                 squares[1] = ((measured - predicted) / self.errors.at(lead)) ** 2
+                lead = (lead + 1) % (self.errors.longest + 1)
         if not is_driven:
             squares[1] = ratio(*self._squares[[1, 1], 1])
         squares = np.minimum(squares, SPIKE)
         self._apart[at] = squares.ravel()
         grown = self._fade * self._squares + [squares, np.ones_like(squares)]
         self._squares = np.where(np.isnan(squares), self._squares, grown)
-        lead = (lead + 1) % (self.errors.longest + 1) if lead else 0
         if not lead and is_driven and (update is None or self._noise.any()):
             self._free[:], lead = self._history, 1
         self._count.lead = lead
@@ -819,7 +819,6 @@ class Live:
         inside = table[1] <= SMALL * scale.spread
         for label, samples in zip(signature.state_labels, held_samples(inside), strict=True):
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
-        words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
         attrs = {
             "start": self._time,
@@ -834,7 +833,9 @@ class Live:
         return xr.Dataset(
             variables,
             coords={
-                "statistic": statistic_coordinate(level, words),
+                "statistic": statistic_coordinate(
+                    level, "the mean minus and plus a quantile times std"
+                ),
                 "time": ("time", time, {"units": "s", "long_name": "time"}),
             },
             attrs=attrs,
@@ -943,13 +944,12 @@ class Live:
         self._count, self._time = _Counts(**content["counts"]), content["time"]
         self._count.taken = min(self._count.taken, self._record)
         size, count = self._history.size, len(self.signature.states)
-        for as_it_is in content["as_it_is"]:
-            update = _Update(np.empty((size, count)), np.empty(count))
-            self._updates.append(None if as_it_is else update)
-        parts = self._parts()
-        begins = np.cumsum([part.size for part in parts[:-1]])
-        for part, own in zip(parts, np.split(values, begins), strict=True):
-            part.flat[:] = own
+        self._updates = [
+            None if as_it_is else _Update(np.empty((size, count)), np.empty(count))
+            for as_it_is in content["as_it_is"]
+        ]
+        for part in self._parts():
+            part.flat[:], values = np.split(values, [part.size])
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
@@ -1091,11 +1091,9 @@ def _plan(future: Any, names: Sequence[str], count: int) -> FloatArray:
 
 def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
     """One sample in the order of the model, NaN for what is missing."""
-    if value is None:
-        return np.full(len(names), np.nan)
-    if isinstance(value, Mapping):
-        _named(name, value, names)
-        value = [value.get(each, math.nan) for each in names]
+    if value is None or isinstance(value, Mapping):
+        given = _named(name, value, names)
+        value = [given.get(each, math.nan) for each in names]
     array = as_real(value, name)
     if array.shape != (len(names),):
         raise RequestError(
