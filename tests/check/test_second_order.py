@@ -10,7 +10,7 @@ from scipy import signal
 from seas import sea
 
 from seakeep import Expression, HankelDMDc, SlowSquares, check
-from seakeep.core.observables import slow_kernel
+from seakeep.models.terms import slow_kernel
 
 DT, PERIOD = 0.1, 1.0
 GAIN, MEMORY = 0.3, 0.9

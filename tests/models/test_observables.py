@@ -9,9 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, Powers, SlowSquares
-from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.models.labelled import ChannelLabel, Span, channel_labels
-from seakeep.models.terms import Bound
+from seakeep.models.terms import Bound, slow_kernel, slow_squares
 
 PERIOD = 15  # samples
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))

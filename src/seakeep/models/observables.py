@@ -21,11 +21,10 @@ from seakeep.arrays import (
     names_of,
     number,
 )
-from seakeep.core.observables import slow_kernel
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.labelled import ChannelLabel
-from seakeep.models.terms import Bound, Formula, Observable, Power, SlowSquare
+from seakeep.models.terms import Bound, Formula, Observable, Power, SlowSquare, slow_kernel
 from seakeep.signals import expressions
 
 HALF_WIDTH = 0.5
