@@ -68,8 +68,8 @@ class Pair(NamedTuple):
 
 
 def paired(
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
+    predicted: object,
+    measured: object,
     training_std: npt.ArrayLike | None = None,
     noise_std: npt.ArrayLike | None = None,
 ) -> Pair:
@@ -198,7 +198,7 @@ def labelled(
                 raise RequestError(
                     f"{name} has a value at each instant, and no interval over time."
                 )
-            if not (isinstance(predicted, xr.Dataset) and isinstance(measured, xr.Dataset)):
+            if not isinstance(predicted, xr.Dataset):
                 values = _valued(of, paired(predicted, measured, training_std, noise_std), interval)
                 return values if values.ndim else values.item()
             pairs, pair = _paired(predicted, measured, training_std, noise_std)
@@ -221,8 +221,9 @@ def labelled(
                 return values.item()
             dims += ("time",) * (keeps == "time")
             coords |= {dim: predicted[dim] for dim in dims if dim in predicted.coords}
-            attrs = {"units": units, "long_name": name}
-            return xr.DataArray(values, coords, dims, name=of.__name__, attrs=attrs)
+            return xr.DataArray(
+                values, coords, dims, of.__name__, {"units": units, "long_name": name}
+            )
 
         # Not its annotations: the arguments of a function of a pair are others.
         update_wrapper(measure, of, ("__module__", "__name__", "__qualname__", "__doc__"))
@@ -233,7 +234,7 @@ def labelled(
 
 
 def _paired(
-    predicted: xr.Dataset, measured: xr.Dataset, training_std: Any = None, noise_std: Any = None
+    predicted: xr.Dataset, measured: Any, training_std: Any = None, noise_std: Any = None
 ) -> tuple[pairing.Paired, Pair]:
     """Channels of two Datasets, with the standard deviations that are given or that they carry."""
     pairs = pairing.pair(predicted=predicted, measured=measured)
@@ -549,8 +550,9 @@ def _with_bounds(
     `redrawn` and `blocks` are those of each model alone, and those that all models share.
     """
     values, (alone, shared) = np.asarray(anrmse), redrawn
-    each = zip(values, alone, blocks[0], strict=True)
-    own = np.array([student_interval(*one, level, -1) for one in each])
+    own = np.array(
+        [student_interval(*one, level, -1) for one in zip(values, alone, blocks[0], strict=True)]
+    )
     changes = student_interval(_ratio(values), _ratio(shared), blocks[1][0], level, -1)
     return {
         "anrmse": values,

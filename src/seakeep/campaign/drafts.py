@@ -95,12 +95,12 @@ def draft_campaign(
     kinds = {run: "regular" if sea.regular else "irregular" for run, sea in seas.items()} | named
     rates = [file.rate for file in read if file.rate and math.isfinite(file.rate)]
     shortest = min((sea.period for sea in seas.values()), default=0.0)
-    common = Path(os.path.commonpath([file.path.resolve().parent for file in read]))
     return rendered(
         "campaign",
         "draft.toml",
         mark=f"{MARK}: draft",
-        name=common.name or "campaign",
+        name=Path(os.path.commonpath([file.path.resolve().parent for file in read])).name
+        or "campaign",
         options=known,
         first=read[0],
         times={file.time for file in read},
@@ -134,12 +134,12 @@ def _loggers(files: Files, guesses: Guesses) -> dict[str, Any]:
         return {"loggers": []}
     loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
     triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
-    waves = [guess.logger for guess in guesses if is_elevation(guess.channel)]
+    waves = (guess.logger for guess in guesses if is_elevation(guess.channel))
     return {
         "loggers": loggers,
         "times_of_loggers": {file.time for file in loggers},
         "triggers": triggers if all(triggers.values()) else {},
-        "reference": (waves or list(triggers))[0],
+        "reference": next(waves, loggers[0].logger),
     }
 
 
@@ -185,8 +185,9 @@ def _roles(
     why = f"guessed: {which} tests, these train" if tests else "the only run to train on"
     if mixed:
         why = "guessed: irregular runs train" + (" but one, the rest tests" if tests else "")
-    trains = [name for name in order if name not in tests]
-    return roles | {n: ("train" if n in trains else "test", why) for n in moved}
+    return roles | {
+        name: ("train" if name in order and name not in tests else "test", why) for name in moved
+    }
 
 
 def _tests_of(names: Sequence[str], seas: Seas) -> tuple[list[str], str]:

@@ -235,8 +235,7 @@ def _start(run: str, files: Files, guesses: Guesses) -> float:
 
 def waves_of_name(run: str) -> str | None:
     """Say "regular" or "irregular" if the name of a run does."""
-    kinds = kinds_of(run)
-    return next((kind for kind in ("irregular", "regular") if kind in kinds), None)
+    return next((kind for kind in ("irregular", "regular") if kind in kinds_of(run)), None)
 
 
 def is_trigger(column: str) -> bool:

@@ -277,9 +277,11 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
     for name, each in run.channels.items():
         if name in needed:
             held[_holder(run, name, each)][name] = each
-    groups = {key: _channels(run, run.loggers[key], own) for key, own in held.items() if own}
-    ahead = [name for name in needed if name in run.settings.derived]
-    return replace(run, groups=groups, ahead=ahead)
+    return replace(
+        run,
+        groups={key: _channels(run, run.loggers[key], own) for key, own in held.items() if own},
+        ahead=[name for name in needed if name in run.settings.derived],
+    )
 
 
 def _holder(run: Run, name: str, own: ChannelSettings) -> str:
@@ -298,10 +300,10 @@ def _holder(run: Run, name: str, own: ChannelSettings) -> str:
         having = [stated]
     if not having:
         listed = ", ".join(dict.fromkeys(c for table in tables.values() for c in table.names))
-        meant = meant_column(column, tables.values())
         raise RequestError(
             f"run '{run.name}': none of its {len(tables)} files has a column '{column}' for "
-            f"channel '{name}'.{meant} Correct [channels.{name}]. Their columns: {listed}."
+            f"channel '{name}'.{meant_column(column, tables.values())} Correct [channels.{name}]. "
+            f"Their columns: {listed}."
         )
     if len(having) > 1:
         raise RequestError(
@@ -354,8 +356,9 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
         attributes = {"units": target, "long_name": long_name_of(name, each.long_name)}
         accuracy = {} if each.accuracy is None else {"accuracy": factor * each.accuracy}
         variables[name] = ("time", values[records], attributes | accuracy)
-    coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
-    return xr.Dataset(variables, {"time": coordinate})
+    return xr.Dataset(
+        variables, {"time": ("time", time[records], {"units": "s", "long_name": "time"})}
+    )
 
 
 def cleaned(run: Run) -> Run:
@@ -477,8 +480,8 @@ def derived(run: Run) -> Run:
     settings, groups, ahead = run.settings, dict(run.groups), []
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
     for name in run.ahead:
-        sources = sources_of(name, settings.derived[name], settings.channel_names)
-        places = {home[source] for source in sources}
+        own = settings.derived[name]
+        places = {home[each] for each in sources_of(name, own, settings.channel_names)}
         home[name] = places.pop() if len(places) == 1 else COMMON
         if home[name] == COMMON:
             ahead.append(name)
@@ -529,8 +532,8 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= _on_axis(run, group, time, dt)
     for name in run.ahead:
         channels |= derive(channels, name, run.settings, dt, run.name)
-    axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
-    data, coordinates = {}, {"time": axis}
+    of_time = next(iter(run.groups.values()))["time"].attrs
+    data, coordinates = {}, {"time": xr.Variable("time", time, of_time)}
     for name in [each for each in run.settings.channel_names if each in channels]:
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:

@@ -104,9 +104,8 @@ def read_table(
     time_name, time = times_of(path, table, options)
     # A run has one `time`: a column of that name beside the stated one is left out.
     others = [name for name in table.names if name not in (time_name, "time")]
-    wanted = others if columns is None else columns
     variables = {}
-    for each in wanted:
+    for each in others if columns is None else columns:
         name = find_column(path, table, each)
         if name == "time":
             raise RequestError(
@@ -119,8 +118,7 @@ def read_table(
         variables[name] = ("time", table.values[name], attributes)
     if not variables:
         raise DataError(f"{path} holds times and no channel. Export the run again.")
-    axis = ("time", time, {"units": "s", "long_name": "time"})
-    return xr.Dataset(variables, {"time": axis})
+    return xr.Dataset(variables, {"time": ("time", time, {"units": "s", "long_name": "time"})})
 
 
 def find_column(path: Path, table: Columns, wanted: str) -> str:

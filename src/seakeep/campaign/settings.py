@@ -408,8 +408,8 @@ class RunSettings(Table):
     @property
     def serves(self) -> str:
         """Role of the run: "train", "test", "train and test" or "unused"."""
-        spans = [use for use in ("train", "test") if getattr(self, use)]
-        return " and ".join(spans) or self.role or "train"
+        spans = " and ".join(use for use in ("train", "test") if getattr(self, use))
+        return spans or self.role or "train"
 
     @model_validator(mode="after")
     def _one_use(self) -> RunSettings:

@@ -167,8 +167,8 @@ def survey(
                 f"run '{name}' is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
                 f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
             )
-    long = {name: each for name, each in counted.items() if each[1] >= FEWEST} or counted
-    measured = float(np.mean([each[0] for each in long.values()])) if long else 0.0
+    long = [each for each in counted.values() if each[1] >= FEWEST] or counted.values()
+    measured = float(np.mean([each[0] for each in long])) if long else 0.0
     period = settings.campaign.encounter_period or measured
     doubts = {name: each[2] for name, each in counted.items()}
     if failures and (not clocks or (period_runs and not counted)):

@@ -225,8 +225,7 @@ def kernel_density(
     1.0
     """
     x, points = as_bundle(series, "the series"), _as_grid(grid)
-    rows = (_once(each) for each in x)
-    out = [_densities(*row, points, _bandwidths(*row, bandwidth))[0] for row in rows]
+    out = [_densities(*row, points, _bandwidths(*row, bandwidth))[0] for row in map(_once, x)]
     return out[0] if np.ndim(series) == 1 else np.stack(out)
 
 

@@ -174,12 +174,11 @@ def _choose(problem: Delayed, ridge: float, all_rows: bool) -> Method:
     if ridge < (NARROW_LIMIT if is_narrow else GRAM_LIMIT) * gram_trace(problem):
         return "svd"
     if not all_rows:
-        return "primal" if p <= n else "dual"
+        return "primal" if is_narrow else "dual"
     # By their largest terms.
-    b = p - a
     rank = 2 * (problem.groups[-1].head.stop + len(problem.pieces))
     primal = p**3 / 3 + 2 * rank * p * (p + a)
-    dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
+    dual = n**3 / 3 + n * n * p + n * a * (2 * p - a)
     return "primal" if primal <= dual else "dual"
 
 

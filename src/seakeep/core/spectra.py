@@ -235,8 +235,7 @@ def ljung_box(correlation: FloatArray, samples: int) -> tuple[FloatArray, FloatA
         :math:`Q = n(n+2)\sum_k \rho_k^2/(n-k)`, and how likely white noise exceeds it.
     """
     lags = np.arange(1, len(correlation))
-    weights = samples * (samples + 2) / (samples - lags)
-    statistic = weights @ correlation[1:] ** 2
+    statistic = samples * (samples + 2) / (samples - lags) @ correlation[1:] ** 2
     return statistic, stats.chi2.sf(statistic, lags.size)
 
 
@@ -392,8 +391,7 @@ def dominant_frequency(series: FloatArray, dt: float) -> float:
     time = dt * np.arange(x.size)
 
     def unexplained(frequency: float) -> float:
-        basis = _basis(time, frequency)
-        return float(np.linalg.lstsq(basis, x, rcond=None)[1].sum())
+        return float(np.linalg.lstsq(_basis(time, frequency), x, rcond=None)[1].sum())
 
     low = max(coarse - 0.5 * width, 0.1 * width)
     peak = optimize.minimize_scalar(

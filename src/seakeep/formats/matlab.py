@@ -68,8 +68,7 @@ def _loaded(path: Path) -> dict[str, Any]:
 
     with path.open("rb") as file:
         hdf5 = file.read(len(_VERSION_73)) == _VERSION_73
-    version = "version 7.3" if hdf5 else "version 5"
-    what = f"a MATLAB file of {version}: cut off or damaged"
+    what = f"a MATLAB file of version {'7.3' if hdf5 else '5'}: cut off or damaged"
     with decoding(path, what, "Save it again from MATLAB."), warnings.catch_warnings():
         opaque = _opaque(path) if hdf5 else {}
         warnings.simplefilter("ignore")  # of classes: they are not channels
@@ -125,8 +124,7 @@ def _unwrapped(content: dict[str, Any]) -> dict[str, Any]:
         long = [key for key, value in content.items() if _length(value) == longest]
         if len(long) != 1 or not isinstance(content[long[0]], dict):
             return content
-        struct = content.pop(long[0])
-        content |= struct
+        content |= content.pop(long[0])
 
 
 def _length(value: Any) -> int:

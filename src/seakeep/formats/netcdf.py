@@ -50,8 +50,8 @@ def read_netcdf(path: Path, options: Options) -> Columns:
             )
             continue
         values[name] = array.values.astype(float)
-        if said := [array.attrs[key] for key in ("units", "unit") if key in array.attrs]:
-            units[name] = _text(said[0])
+        if (said := array.attrs.get("units", array.attrs.get("unit"))) is not None:
+            units[name] = _text(said)
     return Columns(values, units, faults)
 
 
@@ -65,7 +65,7 @@ def _text(attribute: Any) -> str:
         return attribute.decode("latin-1")
 
 
-def opened_netcdf(path: Path, group: str | None = None) -> xr.Dataset:
+def opened_netcdf(path: Path, group: str | None) -> xr.Dataset:
     """Variables of a NetCDF or HDF5 file; a DataError says where it is cut off or damaged."""
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"

@@ -85,11 +85,10 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> Columns:
         if name not in values
     }
     kind = chosen[0].msgtype
-    instants = _times(path, wanted, kind, received, stamps)
     # Subtracted as integers: a count of nanoseconds since 1970 has more digits than a float.
     times = {
         name: 1e-9 * np.array([instant - reader.start_time for instant in own], float)
-        for name, own in instants.items()
+        for name, own in _times(path, wanted, kind, received, stamps).items()
     }
     units = {name: unit for name in values if (unit := _unit(kind, name)) is not None}
     return Columns(times | values, units | dict.fromkeys(times, "s"), faults)
@@ -103,7 +102,7 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
         if not first:
             continue
         message = reader.deserialize(first[2], connection.msgtype)
-        if any(True for _ in _flat(message, "")):
+        if next(_flat(message, ""), None):
             types[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
     if not types:
         topics = ", ".join(sorted({connection.topic for connection in connections})) or "none"

@@ -352,11 +352,10 @@ def estimate_probe_offset(
     blocks = np.stack([block.mean(axis=1) for block in np.array_split(errors, BLOCKS, axis=1)])
     drawn = rng.integers(0, BLOCKS, (RESAMPLES, BLOCKS))
     offsets = np.array([least(blocks[rows].mean(axis=0)) for rows in drawn])
-    interval = (float(np.quantile(offsets, 0.025)), float(np.quantile(offsets, 0.975)))
     return ProbeOffset(
         offset=offset,
         spread=float(offsets.std(ddof=1)),
-        interval=interval,
+        interval=(float(np.quantile(offsets, 0.025)), float(np.quantile(offsets, 0.975))),
         nrmse=float(np.sqrt(errors.mean(axis=1).min())),
         nrmse_uncorrected=float(np.sqrt(_offset_errors(model, part, 0.0).mean())),
         span=(float(part["time"][0]), float(part["time"][-1])),

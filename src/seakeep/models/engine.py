@@ -424,8 +424,7 @@ class _Opened:
             for each in read:
                 wanted = values[each.first - first : each.stop - first]
                 labelled.check_finite(wanted, names, run, self.name, each.first)
-            drive = maps.drive(values, self.spans, run=run, first=first, surge=surge)
-            self.futures.append(drive)
+            self.futures.append(maps.drive(values, self.spans, run=run, first=first, surge=surge))
 
     def _continued(self, signature: Signature, first: int, stop: int) -> list[xr.Dataset]:
         """The run up to a sample, with what is missing of inputs predicted; then departures.

@@ -259,8 +259,8 @@ class HankelEnsemble(Model):
             When they are found, if one or more are not below one.
         """
         if not self._radii:
-            values = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
-            radii = np.array(list(values))
+            every = range(self.n_members)
+            radii = np.array([*in_order(_spectral_radius, self, every, executor, progress)])
             radii.flags.writeable = False
             self._radii.append(radii)
             if unstable := int(np.count_nonzero(radii >= 1.0)):
@@ -716,8 +716,10 @@ class HankelEnsemble(Model):
         DataError
             If a run cannot be used.
         """
-        calibration = calibrate(self, runs, steps, level, scale, folds, executor, progress)
-        return replace(self, calibration=calibration)
+        return replace(
+            self,
+            calibration=calibrate(self, runs, steps, level, scale, folds, executor, progress),
+        )
 
     def without(self, run: str) -> HankelEnsemble:
         """The same draws as they learn from the other runs, to forecast a run that trained.

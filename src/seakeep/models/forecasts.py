@@ -195,8 +195,9 @@ class Model:
         RequestError
             If the file cannot be written, or another one than a model is there.
         """
-        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)
-        return write_sealed(dataset, path, store.MODEL)
+        return write_sealed(
+            self.to_dataset().assign_attrs(seakeep_kind=self.kind), path, store.MODEL
+        )
 
     def _repr_html_(self) -> str:
         """Summary, for notebooks."""
@@ -216,7 +217,7 @@ class Model:
             ", ".join(with_units(labels))
             for labels in (signature.state_labels, signature.input_labels)
         )
-        lines = [
+        return [
             f"  states        {states}",
             f"  inputs        {inputs or 'none (autonomous)'}",
             f"  delays        {self.state_delays} of the states ({self.state_delays * dt:g} s),"
@@ -227,12 +228,10 @@ class Model:
             *(each.describe() for each in signature.readouts),
             f"  training      {sum(training.columns)} snapshot pairs of "
             f"{counted(len(training.runs), 'run')}",
-        ]
-        return lines + [
-            f"    {name}: {columns} pairs, {span_text(first, stop, dt)}"
-            for name, columns, first, stop in zip(
-                training.runs, training.columns, training.first, training.stop, strict=True
-            )
+            *(
+                f"    {name}: {columns} pairs, {span_text(*self.training_spans[name], dt)}"
+                for name, columns in zip(training.runs, training.columns, strict=True)
+            ),
         ]
 
     def forecast(
@@ -548,8 +547,7 @@ def check_arrays(
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
     past = rows_by_name("u_history", u_history, z + 1, inputs, "z + 1")
     _finite("u_history", past[-z - 1 :])
-    is_empty = as_real(u_future, "u_future").size == 0
-    future = np.zeros((0, len(inputs))) if is_empty else u_future
+    future = u_future if as_real(u_future, "u_future").size else np.zeros((0, len(inputs)))
     needed = count - 1 + signature.lead_samples
     meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
     least = needed if ahead == "refuse" else 0
@@ -644,8 +642,7 @@ def statistics_of(values: FloatArray, level: float) -> FloatArray:
 
 def statistic_coordinate(level: float, bounds: str = "") -> xr.Variable:
     """Coordinate of the statistics, which says what the bounds of the band are."""
-    quantiles = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
-    bounds = bounds or quantiles
+    bounds = bounds or f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
     attrs = {
         "long_name": "statistic over the members",
         "comment": f"lower and upper are {bounds}; members that diverged are left out of all four",
@@ -732,10 +729,10 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
         values = values.reshape(lost.shape[1], len(STATISTICS), *each.shape[2:])
         variable = xr.Variable(("window", "statistic", *each.dims[2:]), values, each.attrs)
         variables[name] = variable if "window" in forecast.dims else variable[0]
-    attrs = {"level": level, "members": len(lost), "diverged": int(lost.sum())}
-    coords = forecast.drop_dims("member").coords
-    summary = xr.Dataset(variables, coords, {**forecast.attrs, **attrs})
-    return summary.assign_coords(statistic=statistic_coordinate(level))
+    summary = xr.Dataset(variables, forecast.drop_dims("member").coords, forecast.attrs)
+    return summary.assign_coords(statistic=statistic_coordinate(level)).assign_attrs(
+        level=level, members=len(lost), diverged=int(lost.sum())
+    )
 
 
 def weighed_runs(

@@ -258,8 +258,7 @@ class Live:
         # Rows of samples, from the first one on; half of the room is always there.
         longest = max(s, signature.input_delays) + 1
         self._begins = signature.history_samples
-        needed = 2 * (self._begins + self._ahead + 1)
-        self._record = max(LEAST_RECORD, needed, RECORD * longest)
+        self._record = max(LEAST_RECORD, 2 * (self._begins + self._ahead + 1), RECORD * longest)
         inputs = len(signature.inputs)
         widths = inputs, inputs, count, count, *(each.mean.size for each in signature.scales[1:])
         self._rows = [np.full((2 * self._record, width), np.nan) for width in (*widths, 2 * count)]
@@ -404,8 +403,7 @@ class Live:
         signature, waves = self.signature, self._waves
         is_wave = [at in waves and is_elevation(name) for at, name in enumerate(signature.inputs)]
         moves = [label.units in MOTIONS for label in signature.state_labels]
-        heights = self.model.coverage.heights
-        spread = np.concatenate([0.25 * heights, signature.state_scale.spread])
+        spread = np.concatenate([0.25 * self.model.coverage.heights, signature.state_scale.spread])
         is_smooth = np.array(is_wave + moves) & (spread > 0)
         return np.where(is_smooth, SMOOTH * spread, np.inf)
 
@@ -522,8 +520,7 @@ class Live:
         lost = np.isnan(inputs)
         if not lost.any():
             return inputs
-        from_probes = self.ready and self._follows is None
-        foreseen = self._foreseen if from_probes else foresee
+        foreseen = self._foreseen if self.ready and self._follows is None else foresee
         return np.where(lost, self._expected(self._known_inputs(), 1, foreseen)[0], inputs)
 
     def _expected(
@@ -913,9 +910,11 @@ class Live:
             "noise": self._stated,
             "roles": self._roles,
         }
-        attrs = {"settings": json.dumps(words), "model": self._identity}
-        values = np.concatenate([each.ravel() for each in self._parts()])
-        return write_sealed(xr.Dataset({"values": ("number", values)}, attrs=attrs), path, STATE)
+        state = xr.Dataset(
+            {"values": ("number", np.concatenate([each.ravel() for each in self._parts()]))},
+            attrs={"settings": json.dumps(words), "model": self._identity},
+        )
+        return write_sealed(state, path, STATE)
 
     def _parts(self) -> list[FloatArray]:
         """Views of all that samples and forecasts to come read."""

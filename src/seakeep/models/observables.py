@@ -119,12 +119,9 @@ class SlowSquares:
     def __post_init__(self) -> None:
         orders = _numbers(self.orders, "slow_squares: orders", "0, 1 or 2", 0, 3, whole=True)
         lags = _numbers(self.lags, "slow_squares: lags", "encounter periods from 0", 0)
-        for name, value in (
-            ("of", _inputs(self.of, self.kind)),
-            ("orders", orders),
-            ("lags", lags),
-        ):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "of", _inputs(self.of, self.kind))
+        object.__setattr__(self, "orders", orders)
+        object.__setattr__(self, "lags", lags)
         meant = "per encounter period, above 0 and at most 1"
         number(self.cutoff, "slow_squares: cutoff", meant, TINY, math.nextafter(1, 2))
         number(self.lead, "slow_squares: lead", "encounter periods from 0", 0)
@@ -370,8 +367,10 @@ class Observed:
         if any(getattr(each, "period", 0.0) is None for each in observables):
             period = labelled.mean_period(runs, list(inputs)) * dt
             observables = tuple(counted_in(each, period) for each in observables)
-        windows = labelled.last_samples(runs, window)
-        records = [labelled.channel_matrix(run, inputs, name) for name, run in windows.items()]
+        records = [
+            labelled.channel_matrix(run, inputs, name)
+            for name, run in labelled.last_samples(runs, window).items()
+        ]
         spreads = np.nanstd(np.concatenate(records), axis=0)
         observed = cls(observables, labels, dt, tuple(spreads.tolist()))
         direct = np.concatenate([observed.direct(each) for each in records])

@@ -275,8 +275,7 @@ class HankelSettings:
         check_flag("standardize", self.standardize)
         if not isinstance(self.stable, bool):
             meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
-            hint = f" True is {STABLE_RADIUS:g}."
-            number(self.stable, "stable", meant, TINY, 1.0, hint)
+            number(self.stable, "stable", meant, TINY, 1.0, f" True is {STABLE_RADIUS:g}.")
         example = "mode='effective', surge='measured'"
         aligned = settings_of(ProbeAlignment, "alignment", self.alignment, example)
         object.__setattr__(self, "alignment", aligned)
@@ -324,11 +323,10 @@ class HankelSettings:
         RequestError
             If a length counts in encounter periods and there is none.
         """
-        stated = {name: getattr(self, name) for name in self.lengths}
         values: dict[str, Any] = {
             name: in_samples(value, dt, encounter_period)
-            for name, value in stated.items()
-            if isinstance(value, Length)
+            for name in self.lengths
+            if isinstance(value := getattr(self, name), Length)
         }
         return replace(self, **values) if values else self
 

@@ -129,9 +129,10 @@ class Expression:
                     return value(operand)
                 case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
                     if isinstance(operator, ast.Pow) and not _is_exponent(right):
-                        limit = GREATEST_EXPONENT
                         raise _RefusedError(
-                            node, f"an exponent is a number from -{limit} to {limit}"
+                            node,
+                            f"an exponent is a number from -{GREATEST_EXPONENT} to "
+                            f"{GREATEST_EXPONENT}",
                         )
                     return _OPERATORS[type(operator)](value(left), value(right))
                 case ast.Call(ast.Name(name), arguments, []):
@@ -167,18 +168,18 @@ class Text:
     def __str__(self) -> str:
         return self.text
 
-    def _with(self, pattern: str, other: Any, *, turned: bool = False) -> Text:
-        texts = (self.text, other.text if isinstance(other, Text) else self.number(float(other)))
-        return replace(self, text=pattern.format(*(texts[::-1] if turned else texts)))
+    def _with(self, pattern: str, other: Any) -> Text:
+        text = other.text if isinstance(other, Text) else self.number(float(other))
+        return replace(self, text=pattern.format(self.text, text))
 
     __add__ = partialmethod(_with, "({0} + {1})")
     __sub__ = partialmethod(_with, "({0} - {1})")
     __mul__ = partialmethod(_with, "({0} * {1})")
     __truediv__ = partialmethod(_with, "({0} / {1})")
-    __radd__ = partialmethod(_with, "({0} + {1})", turned=True)
-    __rsub__ = partialmethod(_with, "({0} - {1})", turned=True)
-    __rmul__ = partialmethod(_with, "({0} * {1})", turned=True)
-    __rtruediv__ = partialmethod(_with, "({0} / {1})", turned=True)
+    __radd__ = partialmethod(_with, "({1} + {0})")
+    __rsub__ = partialmethod(_with, "({1} - {0})")
+    __rmul__ = partialmethod(_with, "({1} * {0})")
+    __rtruediv__ = partialmethod(_with, "({1} / {0})")
 
     def __pow__(self, exponent: float) -> Text:
         return self._with(self.power, exponent)

@@ -145,9 +145,9 @@ def regular_sea(
     shift = rng.uniform(0.03, 0.06, 2)
     omega = centre * np.array([1.0, 1.0 - shift[0], 1.0 + shift[1]])
     amplitude = 0.5 * height * np.array([1.0, unsteadiness, unsteadiness])
-    components = slice(0, 3 if unsteadiness > 0 else 1)
-    omega, amplitude, phase = omega[components], amplitude[components], phase[components]
-    return Sea(omega, amplitude, phase, wavenumber(omega, depth))
+    kept = slice(3 if unsteadiness > 0 else 1)
+    omega = omega[kept]
+    return Sea(omega, amplitude[kept], phase[kept], wavenumber(omega, depth))
 
 
 def sea_of_run(name: str, run: RunPlan, facility: FacilitySettings, rng: Generator) -> Sea:

@@ -147,8 +147,8 @@ class RunPlan(Table):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        regular = self.wavelength is not None and self.height is not None
-        if (self.spectrum is None) != regular or (self.wavelength is None) != (self.height is None):
+        is_regular = {self.spectrum is None, self.wavelength is not None, self.height is not None}
+        if len(is_regular) > 1:
             raise ValueError(
                 "a run needs either a spectrum (irregular) or wavelength and height (regular)"
             )
@@ -281,9 +281,8 @@ def _merge(base: dict[str, Any], over: dict[str, Any], trail: tuple[str, ...]) -
     for key, value in over.items():
         here = (*trail, key)
         if isinstance(value, dict) and isinstance(base.get(key), dict) and here not in _REPLACED:
-            result[key] = _merge(base[key], value, here)
-        else:
-            result[key] = value
+            value = _merge(base[key], value, here)
+        result[key] = value
     return result
 
 
