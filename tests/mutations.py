@@ -317,13 +317,6 @@ CHANGES = {
         ("gains.sum() + mean >= least", "gains.sum() >= least", "models/test_conditions.py::test_another_unit_of_a_load_moves_its_mean_too"),
         ("window=None, memory=0)", "window=None)", "models/test_conditions.py::test_an_offset_is_named_also_for_a_model_with_a_memory"),
     ],
-    "models/draws.py": [
-        ("int(generator.integers(needed - 1, samples[run]))", "int(generator.integers(needed, samples[run]))", "models/test_ensemble.py::test_the_frequentist_ensemble_differs_in_its_windows_alone"),
-        ("key = (*seed.spawn_key, member)", "key = (*seed.spawn_key, 0)", "models/test_ensemble.py::test_infeasible_draws_are_drawn_again_and_counted"),
-        ("least = reach + 2 + input_map.around.after", "least = reach + 2", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
-        ("max(settings.window, least) if", "settings.window + reach if", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
-        ("points[number])", "points[0])", "models/test_ensemble.py::test_sobol_points_fill_the_prior_evenly"),
-    ],
     "models/engine.py": [
         ("replace(self, zero=None)", "self", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
         ("measured + (zero - self.zero)[:, None]", "measured", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
@@ -346,6 +339,11 @@ CHANGES = {
         ("data.regress(draw.settings)", "data.regress(self.settings)", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
         ("replace(draw, run=draw.run - 1)", "draw", "models/test_calibration.py::test_members_that_learn_from_the_run_alone_do_not_forecast_it"),
         ("np.maximum(load, each.floor, out=load)", "pass", "models/test_readouts.py::test_a_floor_is_never_undercut_and_a_taut_line_has_none"),
+        ("int(generator.integers(needed - 1, samples[run]))", "int(generator.integers(needed, samples[run]))", "models/test_ensemble.py::test_the_frequentist_ensemble_differs_in_its_windows_alone"),
+        ("key = (*seed.spawn_key, member)", "key = (*seed.spawn_key, 0)", "models/test_ensemble.py::test_infeasible_draws_are_drawn_again_and_counted"),
+        ("least = reach + 2 + input_map.around.after", "least = reach + 2", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
+        ("max(settings.window, least) if", "settings.window + reach if", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
+        ("points[number])", "points[0])", "models/test_ensemble.py::test_sobol_points_fill_the_prior_evenly"),
     ],
     "models/export.py": [
         ("-right.T @ gains[1]", "right.T @ gains[1]", "hosts/test_mat.py::test_the_error_of_a_truncated_system_stays_below_its_bound"),

@@ -16,7 +16,7 @@ import seakeep
 from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform
 from seakeep.models import KINDS, InputMap, alignment, outside_training
 from seakeep.models.alignment import carry_by_dispersion
-from seakeep.models.draws import Draw
+from seakeep.models.ensemble import Draw
 from seakeep.models.validity import Coverage
 
 DT, HEAVE = 0.1, (["heave"], ["eta"])

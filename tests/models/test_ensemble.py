@@ -14,7 +14,7 @@ from scipy import stats
 import seakeep
 from seakeep import HankelDMDc, LogUniform, Uniform
 from seakeep.models import engine, forecasts
-from seakeep.models.draws import child
+from seakeep.models.ensemble import child
 
 PERIOD, DT = 1.6, 0.1  # 16 samples per period
 

@@ -25,14 +25,21 @@ from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR, Subspace
 from seakeep.models.candidates import MEMORY, default_observables
-from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
-from seakeep.models.ensemble import HankelEnsemble, spectral_radius
+from seakeep.models.ensemble import (
+    PRIORS,
+    Draw,
+    HankelEnsemble,
+    Sampling,
+    TrainOn,
+    draw_members,
+    draws_of,
+    spectral_radius,
+)
 from seakeep.models.forecasts import Spec
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
-from seakeep.models.linear import HankelDMDcModel
-from seakeep.models.parametric import regress_varying
+from seakeep.models.linear import HankelDMDcModel, regress_varying
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
