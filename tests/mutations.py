@@ -79,7 +79,7 @@ CHANGES = {
     ],
     "campaign/survey.py": [
         ("self.period / stated.steps_per_period", "self.period / (stated.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
-        ("if each[1] >= FEWEST} or counted", "} or counted", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
+        ("if each[1] >= FEWEST] or counted", "] or counted", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
         ("or steady > NOISY * period", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
     "check/motion.py": [
