@@ -136,8 +136,8 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     assert "times a learnt scale and a floor of" in learnt.summary()
 
 
-def pooled(train_on, runs, window=None):
-    return few(window=window, n_members=6, train_on=train_on, **NOISY).fit(runs, STATES, INPUTS)
+def pooled(train_on, runs, window=None, inputs=INPUTS):
+    return few(window=window, n_members=6, train_on=train_on, **NOISY).fit(runs, STATES, inputs)
 
 
 def assert_learnt(found, *by_hand):
@@ -174,6 +174,11 @@ def test_a_run_that_repeats_the_judged_one_does_not_train():
         ensemble = pooled("all", {name: runs[name] for name in names})
         found = ensemble.calibrate({"b": runs["b"]}, 40, folds="run").calibration
         assert_learnt(found, (pooled("all", {taught: runs[taught]}), runs["b"]))
+    # A command that two runs share is no wave that they repeat.
+    runs = {name: run.rename(eta="thrust") for name, run in runs.items()}
+    others = pooled("all", {name: runs[name] for name in "ac"}, inputs=["thrust"])
+    found = pooled("all", runs, inputs=["thrust"]).calibrate({"b": runs["b"]}, 40, folds="run")
+    assert_learnt(found.calibration, (others, runs["b"]))
 
 
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol, get_args
 
@@ -280,14 +281,17 @@ def held_out(
 def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
     """Members as they learn from runs of other waves; from all other runs where none has others."""
     arrays, signature, alike = ensemble.arrays, ensemble.signature, [run]
-    if signature.inputs:
-        at = np.argmax([*map(is_elevation, signature.inputs)])  # the first elevation, if any
+    if waves := [*filter(is_elevation, signature.inputs)]:
+        at = signature.inputs.index(waves[0])
         records = {n: x[:, at] for n, x in zip(arrays.names, arrays.delayed, strict=True)}
         groups = repeated_waves(records, signature.dt)
         alike = [name for name in records if groups[name] == groups[run]]
-    for name in alike if len(alike) < len(arrays.names) else [run]:
-        ensemble = ensemble.without(name)
-    return ensemble
+    with suppress(RequestError):  # no member has others
+        others = ensemble
+        for name in alike:
+            others = others.without(name)
+        return others
+    return ensemble.without(run)
 
 
 def _parts(ensemble: Ensemble, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:
