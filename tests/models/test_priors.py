@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from seakeep import LogUniform, Uniform
-from seakeep.models.priors import Distribution, prior_json, prior_of
+from seakeep.models.settings import Distribution, prior_json, prior_of
 
 PRIORS = [
     Uniform(10, 30),

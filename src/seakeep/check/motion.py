@@ -398,14 +398,14 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     )
 
 
-def _ends(model: HankelDMDcModel, runs: Datasets) -> dict[str, tuple[FloatArray, FloatArray]]:
+def _ends(model: HankelDMDcModel, runs: Datasets) -> dict[str, list[FloatArray]]:
     """States and inputs over the last quarter of runs in still water, where all are known."""
     ends = {}
     for name, run in runs.items():
         last = slice(-(run.sizes["time"] // 4), None)
         both = [channel_matrix(run, each, name, last) for each in (model.states, model.inputs)]
         if run.attrs.get("waves") == "still" and all(np.isfinite(each).all() for each in both):
-            ends[name] = (both[0], both[1])
+            ends[name] = both
     return ends
 
 

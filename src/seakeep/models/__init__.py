@@ -10,10 +10,9 @@ from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live
 from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares
-from seakeep.models.priors import LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.registry import KINDS, is_ensemble, load_model
-from seakeep.models.settings import Needs, Select
+from seakeep.models.settings import LogUniform, Needs, Select, Uniform
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.terms import Bound
 from seakeep.models.validity import outside_training

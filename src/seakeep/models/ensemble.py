@@ -59,8 +59,7 @@ from seakeep.models.inputs import InputMap, Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
-from seakeep.models.priors import unit_of
-from seakeep.models.settings import HankelSettings
+from seakeep.models.settings import HankelSettings, unit_of
 from seakeep.models.training import TrainingArrays, TrainingData, departing
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
@@ -955,7 +954,7 @@ def _draw_member(
                 "bounds."
             )
             continue
-        own: dict[str, Any] = {
+        own: Json = {
             name: x if name == "ridge" else spec.samples(name, x, dt) for name, x in drawn.items()
         }
         if refused := _out_of_range(own, shared.history):
@@ -982,7 +981,7 @@ def _draw_member(
     raise DataError(f"no feasible draw in {MOST_REDRAWS}: {refused}")
 
 
-def _out_of_range(own: dict[str, Any], history: History) -> str:
+def _out_of_range(own: Json, history: History) -> str:
     """What is wrong with a draw for any runs; empty where nothing is."""
     s, z = own["state_delays"], own["input_delays"]
     for name in PRIORS[1:]:

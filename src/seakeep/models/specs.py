@@ -40,7 +40,6 @@ from seakeep.models.forecasts import Spec
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, regress_varying
-from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
     FreeRuns,
@@ -52,10 +51,14 @@ from seakeep.models.selection import (
 from seakeep.models.settings import (
     OPENED,
     HankelSettings,
+    LogUniform,
     Needs,
+    Prior,
     Select,
+    Uniform,
     in_samples,
     periods_to_samples,
+    prior_of,
 )
 from seakeep.models.training import TrainingArrays, check_names, departing, gather, moments, until
 from seakeep.models.validity import Coverage
@@ -661,7 +664,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
 
     def _single(self, q: float, dt: float) -> HankelDMDc:
         """The single model at a quantile of the window and delays, with the median of λ."""
-        values: dict[str, Any] = {}
+        values: Json = {}
         for name in PRIORS[:3]:
             value = self.at(name, q)
             if value is not None and not np.isfinite(value):
@@ -860,7 +863,7 @@ def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
     return spec if isinstance(spec, HankelDMDc | BayesianHankelDMDc) and spec.is_open else None
 
 
-def _open_settings(encounter_period: float) -> dict[str, Any]:
+def _open_settings(encounter_period: float) -> Json:
     """What both kinds of models that we recommend share; free runs choose in it."""
     return {
         "ridge": "rollout",

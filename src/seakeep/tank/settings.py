@@ -4,11 +4,12 @@ The default numbers stand, with their units and reasons, in ``data/ck14e.toml``.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from seakeep.arrays import Json
 from seakeep.campaign.settings import Band, ChannelName, RunName
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes
@@ -214,7 +215,7 @@ class TankSettings(Table):
     seed: Annotated[int, Field(ge=0, lt=2**64, description="a number from 0 to 2^64 − 1")]
     scale_factor: Positive
     facility: FacilitySettings
-    hull: dict[str, Any]  # dimensions and mesh; tools/build_hydrodynamics.py alone reads them
+    hull: Json  # dimensions and mesh; tools/build_hydrodynamics.py alone reads them
     vessel: VesselSettings
     drift: DriftSettings
     moorings: dict[ChannelName, LineSettings]
@@ -256,7 +257,7 @@ def read_tank(path: Path | str) -> TankSettings:
     return validated(TankSettings, merged, source, "tank")
 
 
-def _spectrum_of(path: Path, where: str) -> dict[str, Any]:
+def _spectrum_of(path: Path, where: str) -> Json:
     """Keys of a spectrum from a file of two columns."""
     try:
         text = read_bytes(path).decode("utf-8").strip()
@@ -275,7 +276,7 @@ def _spectrum_of(path: Path, where: str) -> dict[str, Any]:
 _REPLACED = {("runs",), ("moorings",), ("instruments", "probes"), ("instruments", "slap")}
 
 
-def _merge(base: dict[str, Any], over: dict[str, Any], trail: tuple[str, ...]) -> dict[str, Any]:
+def _merge(base: Json, over: Json, trail: tuple[str, ...]) -> Json:
     """Complete a table by the default one."""
     result = dict(base)
     for key, value in over.items():

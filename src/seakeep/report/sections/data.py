@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from seakeep.arrays import Json
 from seakeep.models.selection import UNHELD
 from seakeep.report.figures.histories import spectrum_figure
 from seakeep.report.page import Section, drawing, section
@@ -129,7 +130,7 @@ def settings(result: StudyResult) -> Section:
     )
 
 
-def _leaves(tables: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _leaves(tables: Json, prefix: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in tables.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{prefix}{key}.")
@@ -160,7 +161,7 @@ def setting_text(key: str, value: Any) -> str:
     return f"{value:.6g}{unit}" if isinstance(value, float) else f"{value}{unit}"
 
 
-def _prior_text(prior: dict[str, Any], unit: str) -> str:
+def _prior_text(prior: Json, unit: str) -> str:
     """A prior, or another table, in words; `unit` is that of bare numbers."""
     lengths = {"T": " T̂", "s": " s"}
     for kind in ("uniform", "log_uniform"):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from seakeep.arrays import Json
 from seakeep.conventions import displayed, is_elevation
 from seakeep.files import write_text
 from seakeep.models.labelled import nearest_sample
@@ -35,7 +36,7 @@ def histories(result: StudyResult) -> Section:
     return section("histories", *figures)
 
 
-def pack(values: npt.ArrayLike) -> dict[str, Any]:
+def pack(values: npt.ArrayLike) -> Json:
     """Pack numbers as 16-bit integers between their bounds, base64; NaN has a code of its own.
 
     Examples
@@ -129,7 +130,7 @@ def _elevations(result: StudyResult) -> list[str]:
     return list(filter(is_elevation, result.groups["channels"]["name"].values))
 
 
-def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any]]:
+def _cells(result: StudyResult, test: str) -> Callable[[int, int], Json]:
     """Packs a cell of a test set, by training set and window: waves, motions, bands, errors."""
     data, elevations = result.tests[test], _elevations(result)
     units = result.groups["channels"]["units"].sel(name=result.channels).values
@@ -141,11 +142,11 @@ def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any
             one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
         series[model] = one["error"].values, {key: one[key].values for key in keys}
 
-    def packed(values: npt.NDArray[Any]) -> list[dict[str, Any]]:
+    def packed(values: npt.NDArray[Any]) -> list[Json]:
         """Values (time, channel) in the units that are shown, packed channel by channel."""
         return [pack(factor * values[:, k]) for k, factor in enumerate(factors)]
 
-    def cell(training: int, window: int) -> dict[str, Any]:
+    def cell(training: int, window: int) -> Json:
         models = {}
         for model, (errors, parts) in series.items():
             rounded = errors[training, window].round(3).tolist()
