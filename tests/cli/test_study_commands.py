@@ -4,7 +4,6 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
 import pytest
@@ -20,7 +19,7 @@ pytest.importorskip("matplotlib")
 
 def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, command, monkeypatch):
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
-    monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
+    monkeypatch.setattr("seakeep.report.page._drawn", lambda page, number: None)
     out = study_folder / "out"
     told, beside = command("study", study_folder / "study.toml", "-o", out, "--workers", 1)
     assert "ANRMSE median" in told
@@ -31,34 +30,20 @@ def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, com
     assert (out / "report.html").exists()
 
 
-@pytest.mark.parametrize(
-    ("near", "words"),
-    [
-        (False, ["Report of act a 0/9: figure", "Report of act b 0/9: figure"]),
-        (True, ["Report 0/2: page of a", "Report 1/2: page of b"]),
-    ],
-)
-def test_each_page_of_a_reproduction_is_named_before_it_is_drawn(
-    near, words, monkeypatch, tmp_path
-):
+def test_each_page_of_a_reproduction_is_named_while_its_figures_are_drawn(monkeypatch, tmp_path):
     told = []
 
     def bar(what):
         return nullcontext(lambda done, total, name: told.append(f"{what} {done}/{total}: {name}"))
 
-    def drawn(result, tell=None):
-        if tell:
-            tell(0, 9, "figure")
-
     monkeypatch.setattr("seakeep.cli.judging.progress_bar", bar)
-    monkeypatch.setattr("seakeep.report.sections.write_report", drawn)
+    monkeypatch.setattr(
+        "seakeep.report.sections.write_report", lambda result, tell, near: tell(0, 9, near)
+    )
     monkeypatch.setattr("seakeep.report.acts.write_reproduction", lambda *each: each[0])
-    if near:
-        monkeypatch.setattr("seakeep.executor.Pool", ThreadPoolExecutor)
     acts = {name: StudyResult(tmp_path, {"study": f"act {name}"}, {}) for name in ("a", "b")}
-    with ThreadPoolExecutor(1) as threads:
-        _write_reproduction(tmp_path, acts, threads)
-    assert told == words
+    _write_reproduction(tmp_path, acts, "pool")
+    assert told == ["Report of act a 0/9: pool", "Report of act b 0/9: pool"]
 
 
 @pytest.mark.parametrize("verb", ["study", "reproduce"])

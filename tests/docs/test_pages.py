@@ -51,7 +51,7 @@ def test_files_of_the_tutorial_are_shown_and_their_draft_can_be_fitted_and_judge
 def test_a_study(tutorial, monkeypatch):
     pytest.importorskip("matplotlib")
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
-    monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
+    monkeypatch.setattr("seakeep.report.page._drawn", lambda page, number: None)
     # One process: the small study is done before another has started.
     play(STUDY.replace("study.toml -o study", "study.toml -o study --workers 1", 1))
     assert (tutorial / "study/report.html").stat().st_size > 10_000

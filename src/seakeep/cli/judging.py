@@ -513,18 +513,18 @@ def study(
     with executor_of(workers, scheduler, cores()) as executor:
         with progress_bar("Study") as tell:
             result = run_study(asked, folder, executor=executor, progress=tell)
-        page = _write_study(result)
+        page = _write_study(result, executor)
     print_table(overview_table(result), note=False)
     for text in findings(result):
         show(text)
     show(f"\nReport: {page}")
 
 
-def _write_study(result: StudyResult) -> Path:
+def _write_study(result: StudyResult, executor: Executor | None = None) -> Path:
     from seakeep.report.sections import write_report
 
-    with progress_bar("Report") as tell:
-        return write_report(result, tell)
+    with progress_bar(f"Report of {result.attrs['study']}") as tell:
+        return write_report(result, tell, executor)
 
 
 def reproduce(
@@ -592,25 +592,10 @@ def report(
 def _write_reproduction(
     folder: Path, results: dict[str, StudyResult], executor: Executor | None = None
 ) -> Path:
-    """Write the pages of the acts, side by side where workers are near, and the one over all."""
-    from seakeep.executor import in_order, on_this_machine
+    """Write the pages of the acts, and the one over all."""
     from seakeep.report.acts import write_reproduction
-    from seakeep.report.sections import write_report
 
-    near = on_this_machine(executor)
-    for each in () if near else results.values():
-        with progress_bar(f"Report of {each.attrs['study']}") as tell:
-            write_report(each, tell)
+    for each in results.values():
+        _write_study(each, executor)
     with progress_bar("Report") as tell:
-        if near:
-            pages = in_order(_write_act, None, [*results.values()], near)
-            for done, name in enumerate(results):
-                tell(done, len(results), f"page of {name}")
-                next(pages)
         return write_reproduction(folder, results, tell)
-
-
-def _write_act(_: None, result: StudyResult) -> None:
-    from seakeep.report.sections import write_report
-
-    write_report(result)

@@ -4,6 +4,7 @@ import base64
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from importlib import resources
@@ -13,6 +14,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
+from seakeep.executor import in_order, on_this_machine
 from seakeep.files import MARK, check_output, templates, write_text
 from seakeep.report.style import Figure, figure_style, save_figure
 from seakeep.report.tables import WORDS, Table, parts_of, shade, with_minus, write_csv, write_latex
@@ -124,6 +126,7 @@ def write_page(
     stamp: Mapping[str, str],
     sections: Sequence[Section],
     progress: Progress | None = None,
+    executor: Executor | None = None,
 ) -> Path:
     """Write a page of sections into a folder, with its figures and tables.
 
@@ -139,6 +142,8 @@ def write_page(
         What it holds.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
+    executor : concurrent.futures.Executor, optional
+        Draws figures side by side, if its workers are on this machine.
 
     Returns
     -------
@@ -157,7 +162,7 @@ def write_page(
     check_output(page, "report")
     drawings = [each for section in sections for each in section.figures]
     drawn = {}
-    with storing(folder), figure_style():
+    with storing(folder):
         if not page.exists():  # figures of an interrupted report are known as ours
             write_text(page, UNFINISHED)
         for kind in ("figures", "tables"):
@@ -166,9 +171,11 @@ def write_page(
             for table in each.tables:
                 write_csv(table, folder / "tables" / f"{table.name}.csv")
                 write_latex(table, folder / "tables" / f"{table.name}.tex")
-        for number, drawing in enumerate(drawings):
-            tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
-            drawn[drawing.name] = _drawn(drawing, folder / "figures")
+        numbers, near = range(len(drawings)), on_this_machine(executor)
+        pictures = in_order(_drawn, (drawings, folder / "figures"), numbers, near)
+        for number, name in enumerate(each.name for each in drawings):
+            tell(number, len(drawings), f"drawing {name.replace('_', ' ')}")
+            drawn[name] = next(pictures)
         content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": True}
         write_text(page, rendered(kind="report", title=title, **content))
     tell(len(drawings), len(drawings), "report written")
@@ -199,21 +206,24 @@ def inline_picture(png: bytes, words: str) -> Markup:
     return Markup(f'<img alt="{escape(words)}" src="data:image/png;base64,{encoded}">')
 
 
-def _drawn(drawing: Drawing, folder: Path) -> Markup:
+def _drawn(page: tuple[Sequence[Drawing], Path], number: int) -> Markup:
     """Draw a figure, write its files, and return it as an element of the page."""
-    import matplotlib as mpl
-
-    figure = drawing.draw()
-    engine = figure.get_layout_engine()
-    if engine:  # laid out once, not again for each file
-        engine.execute(figure)
-        # Without any engine; "none" stands for one, for which each file would be drawn twice.
-        figure.set_layout_engine(None)
-    save_figure(figure, folder / f"{drawing.name}.png")
+    drawings, folder = page
+    drawing = drawings[number]
     name, label, buffer = drawing.name, f"title-{drawing.name}", io.StringIO()
-    # Letters are shapes, so that it looks the same wherever it is opened.
-    with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    with figure_style():
+        import matplotlib as mpl
+
+        figure = drawing.draw()
+        engine = figure.get_layout_engine()
+        if engine:  # laid out once, not again for each file
+            engine.execute(figure)
+            # Without any engine; "none" stands for one, for which each file would be drawn twice.
+            figure.set_layout_engine(None)
+        save_figure(figure, folder / f"{name}.png")
+        # Letters are shapes, so that it looks the same wherever it is opened.
+        with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
+            figure.savefig(buffer, format="svg", metadata={"Date": None})
     # A tenth of a point is all that can be seen, and half of the file.
     shorten = re.compile(r"(\.\d)\d+")
     text = re.sub(r' d="[^"]*"', lambda path: shorten.sub(r"\1", path[0]), buffer.getvalue())

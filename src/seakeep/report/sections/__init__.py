@@ -1,5 +1,6 @@
 """The report of a study: its sections, each a function of the result, in their order."""
 
+from concurrent.futures import Executor
 from pathlib import Path
 
 from seakeep.arrays import Progress
@@ -30,7 +31,9 @@ SECTIONS = [
 """A section is one function here; one that has nothing to show is left out."""
 
 
-def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
+def write_report(
+    result: StudyResult, progress: Progress | None = None, executor: Executor | None = None
+) -> Path:
     """Write ``report.html`` with its ``figures/``, ``tables/`` and ``histories/``.
 
     Figures are PNG and SVG, tables CSV and LaTeX; histories are what the interactive plot loads.
@@ -41,6 +44,8 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
         The study; all is written into its folder.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
+    executor : concurrent.futures.Executor, optional
+        As of :func:`seakeep.report.page.write_page`.
 
     Returns
     -------
@@ -53,4 +58,4 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
     with storing(result.folder):
         histories.write_histories(result)
     title = f"{result.attrs['study']}: study report"
-    return write_page(result.folder, title, stamp, sections, progress)
+    return write_page(result.folder, title, stamp, sections, progress, executor)
