@@ -10,6 +10,7 @@ from records import table
 
 from seakeep import HankelDMDc
 from seakeep.core.recursion import Place, Recursion, recursion
+from seakeep.errors import DataError
 from seakeep.models.calibration import envelope_of
 from seakeep.models.labelled import Span
 
@@ -47,6 +48,15 @@ def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
     assert found.shape == (2, 50)
     assert np.all((found > 0.2) & (found < 3))  # SD of the waves of training
     assert not np.allclose(found[0], other[0], rtol=1e-3)
+
+
+def test_a_surge_in_other_units_than_metres_is_refused(drifts):
+    far = [run.assign(surge=run["surge"] * 1000.0) for run in drifts]
+    with pytest.raises(
+        DataError,
+        match=r" 1200 m in training, 2[0-9]{2} wavelengths\. Check that 'surge' is in metres",
+    ):
+        SPEC.fit(far, STATES, INPUTS)
 
 
 def test_a_ridge_weighs_a_hundred_times_on_powers(models):

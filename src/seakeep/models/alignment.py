@@ -67,6 +67,8 @@ LEAD = 0.56
 up-wave say what is there."""
 PER_WAVE = 40
 """Places of the grid per length of the peak's wave: four times as far apart cost 0.015 SD."""
+MOST_PLACES = 4000
+"""Of the grid: a vessel that moves over 25 lengths of the waves."""
 BEYOND = 1.5
 """Part of the trained range of surge by which the grid goes beyond either end of it."""
 REACH = 0.5
@@ -555,6 +557,12 @@ class Following:
         peak = float(wavenumber(omega[np.argmax(power)], alignment.water_depth))
         spacing = 2 * np.pi / peak / PER_WAVE
         places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
+        if places > MOST_PLACES:
+            surge, far = alignment.settings.surge_channel, high - low
+            raise DataError(
+                f"{surge} moves over {far:.4g} m in training, {far / PER_WAVE / spacing:.0f} "
+                f"wavelengths. Check that '{surge}' is in metres, or set alignment surge = 'none'."
+            )
         return cls(
             alignment=alignment,
             column=list(states).index(alignment.settings.surge_channel),

@@ -541,8 +541,8 @@ def _carried(
     if count > MOST_TERMS:
         raise RequestError(
             f"distances from {lowest:g} to {highest:g} m span {reach / np.pi:.0f} of the shortest "
-            f"wavelengths that a step of {step:g} s resolves. Resample the elevation to some 30 "
-            "samples per wave period first."
+            f"wavelengths that a step of {step:g} s resolves. Check that they are in metres, or "
+            "resample the elevation to some 30 samples per wave period first."
         )
     records = np.empty((count, *flat.shape))
     nodes = chebyshev.chebpts1(count)
