@@ -212,7 +212,8 @@ def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_cho
         {(row["alignment"], row["ridge"]): row["score"] for row in each.rows}
         for each in (found, again)
     )
-    assert all(one[key] == other[key] for key in one.keys() & other.keys())
+    both = sorted(one.keys() & other.keys())  # equal but for where memory is aligned
+    assert_allclose([one[key] for key in both], [other[key] for key in both], rtol=1e-9)
     assert again.settings == found.settings
     # Without positions and depth there is nothing to carry by.
     bare = {
