@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matrices import Problem
+from near import assert_near
 from numpy.testing import assert_allclose
 
 from seakeep.core import training_window
@@ -56,9 +57,9 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, all_rows
     # rows of the inverse from its structure lose up to two more where there are fewer columns than
     # regressors, where they are not chosen (5e-10 at the median of 60 draws, 2e-8 at the worst).
     largest = np.abs(svd).max()
-    assert_allclose([chosen.coefficients, dual], [svd, svd], rtol=0, atol=1e-10 * largest)
+    assert_near([chosen.coefficients, dual], [svd, svd], 1e-10 * largest)
     lost = 200 if all_rows and shape == WIDE else 1
-    assert_allclose(primal, svd, rtol=0, atol=lost * 1e-10 * largest)
+    assert_near(primal, svd, lost * 1e-10 * largest)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +86,7 @@ def test_the_newest_rows_alone_are_regressed_with_less(part, digits):
     svd = made.solved(part * trace, all_rows=False, method="svd").coefficients
     assert found.method == "primal"
     # A condition number of 1e8 or 1e10 of sixteen digits, with a margin of five.
-    assert_allclose(found.coefficients, svd, rtol=0, atol=5 * 10.0**-digits * np.abs(svd).max())
+    assert_near(found.coefficients, svd, 5 * 10.0**-digits * np.abs(svd).max())
     assert made.solved(0.99 * NARROW_LIMIT * trace, all_rows=False).method == "svd"
 
 

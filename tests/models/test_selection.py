@@ -9,6 +9,7 @@ from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
 from free_runs import held_out_scores
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from oscillators import OF_ARX, arx_run
 from records import record
@@ -69,7 +70,7 @@ def test_free_runs_side_by_side_score_as_one_after_the_other(monkeypatch):
         for one, (scores, weights) in zip(tried, found, strict=True):
             ((alone, own),) = judge(problem, [one], fold)
             # Products of matrices are summed in another order.
-            assert_allclose(scores, alone, rtol=0, atol=1e-9)
+            assert_near(scores, alone, 1e-9)
             assert_array_equal(weights, own)
         batches.append(len(tried))
         return found
