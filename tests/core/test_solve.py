@@ -46,7 +46,7 @@ def linear(shape):
 def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, all_rows):
     """At the least λ for which one is; of larger ones: `test_fast_paths.py`."""
     made = linear(shape)
-    ridge = 1.01 * GRAM_LIMIT * np.sum(made.matrices()[0] ** 2)
+    ridge = 1.01 * GRAM_LIMIT * made.trace
     chosen = made.solved(ridge, all_rows=all_rows)
     assert chosen.method in ("primal", "dual")
     primal, dual, svd = (
@@ -67,7 +67,7 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, all_rows
 )
 def test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below(shape, form, all_rows):
     made = problem(shape)
-    limit = GRAM_LIMIT * np.sum(made.matrices()[0] ** 2)
+    limit = GRAM_LIMIT * made.trace
     assert GRAM_LIMIT == 1e-6
     # The trace is summed to rounding; a millionth is beyond it.
     ridges = limit * (1 + 1e-6), limit * (1 - 1e-6), 0.0
@@ -80,14 +80,13 @@ def test_the_newest_rows_alone_are_regressed_with_less(part, digits):
     made = linear((3, 4, 200))
     # Twice summed noise is smooth: singular values of its delays spread over five decades.
     made = replace(made, inputs=[made.inputs[0].cumsum(axis=0).cumsum(axis=0)])
-    trace = np.sum(made.matrices()[0] ** 2)
     assert np.linalg.cond(made.matrices()[0]) > 1e5
-    found = made.solved(part * trace, all_rows=False)
-    svd = made.solved(part * trace, all_rows=False, method="svd").coefficients
+    found = made.solved(part * made.trace, all_rows=False)
+    svd = made.solved(part * made.trace, all_rows=False, method="svd").coefficients
     assert found.method == "primal"
     # A condition number of 1e8 or 1e10 of sixteen digits, with a margin of five.
     assert_near(found.coefficients, svd, 5 * 10.0**-digits * np.abs(svd).max())
-    assert made.solved(0.99 * NARROW_LIMIT * trace, all_rows=False).method == "svd"
+    assert made.solved(0.99 * NARROW_LIMIT * made.trace, all_rows=False).method == "svd"
 
 
 def test_without_ridge_dependent_regressors_share_their_weight():

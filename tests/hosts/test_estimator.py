@@ -266,7 +266,8 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_pat
         *((1, False, 9, 0), (1, False, 0, -9), (1, False, 0, 9)),
     ):
         found, live = Estimator(library, "rom", 3), model.live()
-        u, y = zero + table(case.run, model.inputs), table(case.run, model.states)
+        u, y = values(case.run, model)
+        u += zero
         y[:, model.states.index("surge")] += away
         if slow:  # a swell of 0.24 Hz
             u[:] = 0.02 * np.sin(0.15 * np.arange(len(u)))[:, None]

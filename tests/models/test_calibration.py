@@ -22,6 +22,11 @@ def sea(seed, samples=1600, name="sea"):
     return wave_run(seed, samples, name, 1.5)
 
 
+def seas(names):
+    """A sea of its own for each name."""
+    return {name: sea(seed, 500, name) for seed, name in enumerate(names)}
+
+
 @pytest.fixture(scope="module")
 def run():
     return sea(0)
@@ -150,7 +155,7 @@ def assert_learnt(found, *by_hand):
 
 
 def test_folds_are_forecast_by_what_the_other_runs_teach():
-    runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b", "c"))}
+    runs = seas("abc")
     ensemble = pooled("all", runs)
     with request_error(r"or let each run .* \(folds='run'"):
         ensemble.calibrate(runs, steps=40)
@@ -183,8 +188,7 @@ def test_a_run_that_repeats_the_judged_one_does_not_train():
 
 
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
-    runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b"))}
-    ensemble = pooled("runs", runs)
+    ensemble = pooled("runs", seas("ab"))
     without = ensemble.without("a")
     assert without.arrays.names == ("b",)
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]

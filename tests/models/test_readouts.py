@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_runs
 from drifting import STATES as MOTIONS
 from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
@@ -34,7 +34,7 @@ def bow(kind):
 
 @pytest.fixture(scope="module")
 def runs():
-    return {f"run{seed}": drifting_run(seed) for seed in (1, 2, 3)}
+    return drifting_runs(3)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from ensembles import few
 from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
-from oscillators import Oscillator
+from oscillators import Oscillator, growing_model
 from records import record
 from said import warned
 
@@ -48,8 +48,7 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(factor, scale):
     # The growth of the model is set by hand: what is tested is the end of the run, whatever the
     # speed it comes at and the unit it comes in. Warnings are errors in this suite.
     run = growing(scale=scale)
-    model = HankelDMDc(0, 0, 1e-9, delay_rows="exact").fit(run, ["heave"], ["eta_fwd"])
-    model = replace(model, coefficients=np.array([[factor, 0.0]]))
+    model = growing_model(run, factor)
     long = run.pad(time=(0, 1000), mode="wrap").assign_coords(time=0.1 * np.arange(1060))
     forecast = model.forecast(long, start=1.0)
     lost = np.isnan(forecast.heave.values)

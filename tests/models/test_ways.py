@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, FOLLOWED, INPUTS, OBSERVABLES, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, OBSERVABLES, drifting_run, drifting_runs
 from near import assert_near
 from records import arrays_at, fed, table
 from said import data_error
@@ -46,7 +46,7 @@ def settings(key):
 
 @pytest.fixture(scope="module")
 def runs():
-    return [drifting_run(seed, 1200) for seed in (1, 2)]
+    return drifting_runs(2, 1200)
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,9 @@ def test_training_reads_its_window_and_nothing_else(runs, run, model, expected):
     settings = model.settings
     history = 0 if settings.history == "inside" else model.history_samples
     first = 200 - history if settings.window else 0
-    found = settings.fit([each.isel(time=slice(first, 1101)) for each in runs], STATES, INPUTS)
+    found = settings.fit(
+        [each.isel(time=slice(first, 1101)) for each in runs.values()], STATES, INPUTS
+    )
     # BLAS sums in an order that follows the memory.
     assert_near(found.coefficients, model.coefficients, 1e-11)
     again = table(forecast_of(found, run), STATES)
