@@ -5,6 +5,7 @@ import runpy
 
 import numpy as np
 import pytest
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from pages import page
 from places import ROOT
@@ -120,7 +121,7 @@ def test_an_observable(add, tmp_path):
     again = seakeep.load_model(model.save(tmp_path / "slope.nc"))
     forecast = again.forecast(run, start=10.0, steps=300)
     # The moments leave out the first samples: 2 of 600.
-    assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
+    assert_near(forecast.heave, run.heave.sel(time=forecast.time), 5e-3)
 
 
 OWN = page("howto/own_method.md").partition("```python\n")[2].partition("```")[0]
@@ -137,7 +138,7 @@ def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add,
         own = Own(0, 8, **given).fit(run, states, ["eta_cog"])
         fir = FIR(8, **given).fit(run, states, ["eta_cog"])
         # Normal equations of another order.
-        assert_allclose(own.coefficients, fir.coefficients, rtol=0, atol=1e-9)
+        assert_near(own.coefficients, fir.coefficients, 1e-9)
     put_tutorial(
         tmp_path,
         STUDY.replace(

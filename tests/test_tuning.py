@@ -22,7 +22,6 @@ SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
 @pytest.mark.parametrize(
     ("folds", "words", "centre"),
     [
-        ("run", "mean NRMSE", 0),
         ("run", "mean NRMSE", 3 * PERIOD),
         ("sea_state", "the runs of its sea state, of which there are 2", 0),
         ("auto", "the runs that repeat its waves; 2 waves differ", 0),

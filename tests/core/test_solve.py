@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matrices import Problem
+from near import assert_near
 from numpy.testing import assert_allclose
 
 from seakeep.core import training_window
@@ -45,7 +46,7 @@ def linear(shape):
 def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, all_rows):
     """At the least λ for which one is; of larger ones: `test_fast_paths.py`."""
     made = linear(shape)
-    ridge = 1.01 * GRAM_LIMIT * np.sum(made.matrices()[0] ** 2)
+    ridge = 1.01 * GRAM_LIMIT * made.trace
     chosen = made.solved(ridge, all_rows=all_rows)
     assert chosen.method in ("primal", "dual")
     primal, dual, svd = (
@@ -56,9 +57,9 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, all_rows
     # rows of the inverse from its structure lose up to two more where there are fewer columns than
     # regressors, where they are not chosen (5e-10 at the median of 60 draws, 2e-8 at the worst).
     largest = np.abs(svd).max()
-    assert_allclose([chosen.coefficients, dual], [svd, svd], rtol=0, atol=1e-10 * largest)
+    assert_near([chosen.coefficients, dual], [svd, svd], 1e-10 * largest)
     lost = 200 if all_rows and shape == WIDE else 1
-    assert_allclose(primal, svd, rtol=0, atol=lost * 1e-10 * largest)
+    assert_near(primal, svd, lost * 1e-10 * largest)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, all_rows
 )
 def test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below(shape, form, all_rows):
     made = problem(shape)
-    limit = GRAM_LIMIT * np.sum(made.matrices()[0] ** 2)
+    limit = GRAM_LIMIT * made.trace
     assert GRAM_LIMIT == 1e-6
     # The trace is summed to rounding; a millionth is beyond it.
     ridges = limit * (1 + 1e-6), limit * (1 - 1e-6), 0.0
@@ -79,14 +80,13 @@ def test_the_newest_rows_alone_are_regressed_with_less(part, digits):
     made = linear((3, 4, 200))
     # Twice summed noise is smooth: singular values of its delays spread over five decades.
     made = replace(made, inputs=[made.inputs[0].cumsum(axis=0).cumsum(axis=0)])
-    trace = np.sum(made.matrices()[0] ** 2)
     assert np.linalg.cond(made.matrices()[0]) > 1e5
-    found = made.solved(part * trace, all_rows=False)
-    svd = made.solved(part * trace, all_rows=False, method="svd").coefficients
+    found = made.solved(part * made.trace, all_rows=False)
+    svd = made.solved(part * made.trace, all_rows=False, method="svd").coefficients
     assert found.method == "primal"
     # A condition number of 1e8 or 1e10 of sixteen digits, with a margin of five.
-    assert_allclose(found.coefficients, svd, rtol=0, atol=5 * 10.0**-digits * np.abs(svd).max())
-    assert made.solved(0.99 * NARROW_LIMIT * trace, all_rows=False).method == "svd"
+    assert_near(found.coefficients, svd, 5 * 10.0**-digits * np.abs(svd).max())
+    assert made.solved(0.99 * NARROW_LIMIT * made.trace, all_rows=False).method == "svd"
 
 
 def test_without_ridge_dependent_regressors_share_their_weight():

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from near import assert_near
 from numpy.random import default_rng
-from numpy.testing import assert_allclose
 from records import rms
 
 from seakeep.core.embedding import TrainingWindow
@@ -50,12 +50,12 @@ def test_a_known_system_is_recovered_and_forecast_to_rounding(inputs):
     u = np.split(default_rng(2).normal(size=(1000, inputs)), [300, 500])
     y = [simulate(system, each) for each in u]
     found = fitted(y[:2], u[:2])
-    assert_allclose(modes(found.A), modes(system[0]), atol=1e-8)
+    assert_near(modes(found.A), modes(system[0]), 1e-8)
     starts = [50, 200]
     outputs = np.stack([y[2][k - 12 : k + 1] for k in starts])
     driving = np.stack([u[2][k - 12 : k + 100] for k in starts])
     forecast = found.free_runs(outputs, driving, np.empty((2, 100, 0)))
-    assert_allclose(forecast, [y[2][k + 1 : k + 101] for k in starts], atol=1e-7)
+    assert_near(forecast, [y[2][k + 1 : k + 101] for k in starts], 1e-7)
 
 
 def test_a_mode_that_grows_is_moved_onto_the_unit_circle_and_no_other():
@@ -69,7 +69,7 @@ def test_a_mode_that_grows_is_moved_onto_the_unit_circle_and_no_other():
     found = modes(fitted([simulate((a, b, c), u)], [u]).A)
     expected = np.where(slowest, values / np.abs(values), values)
     # The slower modes are small beside one that has grown a hundredfold.
-    assert_allclose(found, np.sort_complex(expected), atol=1e-6)
+    assert_near(found, np.sort_complex(expected), 1e-6)
 
 
 def test_direct_inputs_drive_and_do_not_tell_the_past():

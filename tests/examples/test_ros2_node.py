@@ -19,6 +19,7 @@ pytest.importorskip("rosbags")
 
 import stand_in_ros
 from bags import message, quaternion, write_bag
+from near import assert_near
 
 EXAMPLE = ROOT / "examples/ros2_node"
 DT = 0.05
@@ -188,7 +189,7 @@ def test_the_node_follows_a_recorded_bag(node, started, model, make_run, tmp_pat
         assert list(each.name) == model.states
         if at not in (60, 61):
             measured = table(run, model.states)[at]
-            assert_allclose(each.position, measured, atol=1e-12)  # via a quaternion
+            assert_near(each.position, measured, 1e-12)  # via a quaternion
     assert vessel.warnings == [
         "lost in the last 10 s: eta_fwd missing: 1, heave missing: 2, pitch missing: 2"
     ]
@@ -200,7 +201,7 @@ def test_angles_of_a_quaternion(node, turn):
     angles = [node.read(quaternion(turn), [name]) for name in ("yaw", "pitch", "roll")]
     # asin is steep where the bow points upwards.
     found, turned = Rotation.from_euler("ZYX", [angles, turn]).as_quat()
-    assert_allclose(found, turned, atol=1e-7)
+    assert_near(found, turned, 1e-7)
 
 
 @pytest.mark.parametrize(("w", "covariance"), [(np.nan, 0.0), (0.0, 0.0), (1.02, 0.0), (1.0, -1.0)])

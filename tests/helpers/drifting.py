@@ -49,6 +49,11 @@ def drifting_run(seed=0, samples=1500, moved=0.0):
     return run
 
 
+def drifting_runs(count, *more):
+    """So many of them, by their names."""
+    return {f"run{seed}": drifting_run(seed, *more) for seed in range(1, count + 1)}
+
+
 def heave_error(model, run):
     """Error of the heave of a forecast of 300 steps, of the SD of what was measured."""
     forecast = model.forecast(run, start=60.0, steps=300)

@@ -29,6 +29,11 @@ class Problem:
             targets.append(embed(x, self.s if all_rows else 0, first + 1, count))
         return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
+    @property
+    def trace(self):
+        """Sum of the squares of the regressors."""
+        return np.sum(self.matrices()[0] ** 2)
+
     def runs(self):
         return zip(self.states, self.inputs, self.direct, self.windows, strict=True)
 

@@ -1,10 +1,12 @@
 """Runs whose law is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from records import record
 from scipy import signal
+
+from seakeep import HankelDMDc
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,12 @@ class Oscillator:
         *_, state = signal.dlsim((*self.system, self.dt), force, x0=2 * rng.standard_normal(2))
         attrs = {"encounter_period": 3.0}
         return record(self.dt, attrs, heave=state[:, 0], heave_rate=state[:, 1], eta_fwd=force)
+
+
+def growing_model(run, factor, delays=0):
+    """A model of heave that grows by a factor a step, whatever the wave."""
+    model = HankelDMDc(delays, 0, 1e-9, delay_rows="exact").fit(run, ["heave"], ["eta_fwd"])
+    return replace(model, coefficients=factor * np.eye(1, delays + 2))
 
 
 OF_ARX = ["heave"], ["eta"]

@@ -8,6 +8,7 @@ import compiled
 import numpy as np
 import pytest
 from compiled import pointer
+from near import assert_near
 from numpy.testing import assert_allclose
 from records import table
 
@@ -76,6 +77,11 @@ class Estimator:
         assert self.step(u, y) == 0
         return self.state, live.step(u, y)
 
+    def follow(self, live, u, y):
+        """Step both through samples, with the same estimates."""
+        for sample in zip(u, y, strict=True):
+            assert_near(*self.beside(live, *sample), 1e-9)
+
     @property
     def validity(self):
         return self.calls["validity"](self.memory)
@@ -130,14 +136,13 @@ def test_far_from_the_mean_of_training_a_forecast_lasts_as_in_the_live_model(
     live, found = doubted.live(), Estimator(built(doubted, tmp_path), "rom")
     u, y = values(make_run(100, 5), model)
     y[:, 0] += side * scale.spread[0]
-    for at in range(100):
-        assert_allclose(*found.beside(live, u[at], y[at]), rtol=0, atol=1e-9)
+    found.follow(live, u, y)
     forecast = found.forecast(60)[1][0]
     assert_allclose(forecast, moments(live.forecast(60), STATES)[0], rtol=1e-9, atol=1e-9)
     far = (forecast - scale.centre) / scale.spread
     assert abs(far[3, 0]) > 3.0
-    assert_allclose(far[-1], 0.0, atol=1e-12)
-    assert_allclose(far[1:, 1], 0.0, atol=1e-12)  # the first step is driven by waves as measured
+    assert_near(far[-1], 0.0, 1e-12)
+    assert_near(far[1:, 1], 0.0, 1e-12)  # the first step is driven by waves as measured
 
 
 @pytest.mark.usefixtures("errors_of_training")
@@ -148,7 +153,7 @@ def test_what_jumps_is_lost_as_in_the_live_model(exact, model, make_run):
     y[15], y[420], y[500:503] = y[15] + far, y[420] + far, y[500:503] + far
     u[600, 0] += 1e3
     for at in range(COUNT):
-        assert_allclose(*found.beside(live, u[at], y[at]), rtol=0, atol=1e-9)
+        assert_near(*found.beside(live, u[at], y[at]), 1e-9)
         jumped += [(at, each) for each in live.jumped]
         if at in (419, 420, 435, 436, 502, 600):
             assert found.validity & (Validity.CONSISTENCY | Validity.LOST) == live.validity
@@ -162,8 +167,7 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
 ):
     found, live = beside_a_constant(model, tmp_path)
     u, y = measured(make_run(COUNT, 5), model)
-    for at in range(325):  # u[315:320] is lost
-        found.beside(live, u[at], y[at])
+    found.follow(live, u[:325], y[:325])  # u[315:320] is lost
     plan = np.full((29, 2), np.nan)
     plan[3:, 1] = np.linspace(0, 1, 26)
     expected = moments(live.forecast(30, {"eta_cog": plan[:, 1]}), STATES)
@@ -172,23 +176,21 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
 
 def test_of_an_input_that_is_no_wave_the_mean_alone_is_judged(exact, model, make_run, tmp_path):
     constant = beside_a_constant(model, tmp_path)
-    u, y = values(make_run(COUNT, 5), model)
+    u, y = values(make_run(300, 5), model)
     for (found, live), outside in ((exact, Validity.HEIGHT | Validity.STEEPNESS), (constant, 0)):
-        for at in range(300):
-            found.beside(live, u[at] * [1, 3], y[at])
+        found.follow(live, u * [1, 3], y)
         assert found.validity == live.conditions.validity == outside
-        for at in range(300):
-            found.beside(live, u[at] + [0, 30], y[at])
+        found.follow(live, np.add(u, [0, 30]), y)
         assert found.validity & live.conditions.validity & Validity.MEAN
 
 
 def test_a_mean_is_judged_over_two_periods_or_more(exact, model, make_run):
     found, live = exact
-    u, y = values(make_run(COUNT, 5), model)
-    for at in range(least := 8 * live.equations["gap"]):
-        found.beside(live, u[at] + [0, 30], y[at])
+    u, y = values(make_run(8 * live.equations["gap"] + 1, 5), model)
+    u += [0, 30]
+    found.follow(live, u[:-1], y[:-1])
     assert not (found.validity | live.conditions.validity) & Validity.MEAN
-    found.beside(live, u[least] + [0, 30], y[least])
+    found.beside(live, u[-1], y[-1])
     assert found.validity & live.conditions.validity & Validity.MEAN
 
 
@@ -204,7 +206,7 @@ def test_a_record_that_stands_still_or_whose_order_is_half_is_predicted_to(exact
     for at, wave in enumerate(np.append(record, np.full(4, np.nan))):
         found.beside(live, np.full(2, wave), np.full(2, 0.1 * at))
     # Which reads what was predicted.
-    assert_allclose(*found.beside(live, np.zeros(2), np.full(2, np.nan)), rtol=0, atol=1e-12)
+    assert_near(*found.beside(live, np.zeros(2), np.full(2, np.nan)), 1e-12)
 
 
 def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
@@ -263,13 +265,13 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_pat
         *(still, (2.5, False, 0, 0), (1, True, 0, 0)),
         *((1, False, 9, 0), (1, False, 0, -9), (1, False, 0, 9)),
     ):
-        found, live = Estimator(library, "rom"), model.live()
-        u, y = zero + table(case.run, model.inputs), table(case.run, model.states)
+        found, live = Estimator(library, "rom", 3), model.live()
+        u, y = values(case.run, model)
+        u += zero
         y[:, model.states.index("surge")] += away
         if slow:  # a swell of 0.24 Hz
             u[:] = 0.02 * np.sin(0.15 * np.arange(len(u)))[:, None]
-        for at in range(300):
-            found.beside(live, factor * u[at], y[at])
+        found.follow(live, factor * u[:300], y[:300])
         validity = live.conditions.validity
         assert found.validity == validity
         assert bool(validity) == ((factor, slow, away, zero) != still)
@@ -299,16 +301,16 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
 
         nowhere, live._foreseen = [np.nan] * len(model.inputs), foreseen
     # The same sums in another order, through gains of the order of ten.
-    close = {"rtol": 0, "atol": 1e-10 if "following" in name else 1e-12}
+    close = 1e-10 if "following" in name else 1e-12
     for at in range(340):
         estimates = np.array(found.beside(live, u[at], y[at])) / size
-        assert_allclose(*estimates, **close, err_msg=str(at))
+        assert_near(*estimates, close)
         if at == 5:
             assert (found.forecast(20)[0] == 1) == bool(model.inputs)  # no sample so far
         if at > 20:
             expected = np.sqrt(np.maximum(np.diagonal(live.covariance)[:2], 0.0))
             few = size[:2]
-            assert_allclose(found.deviations / few, expected / few, rtol=1e-6, atol=close["atol"])
+            assert_allclose(found.deviations / few, expected / few, rtol=1e-6, atol=close)
         if at in (95, 148, 190, 290, 309, 317, 339):
             assert found.validity & Validity.LOST == live.validity & Validity.LOST
             ways = [(120, None)]  # whose mean tends to that of training
@@ -321,5 +323,5 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
                 status, forecast = found.forecast(steps, known)
                 assert status == 0
                 expected = moments(live.forecast(steps, known), model.states)
-                near = {"rtol": 1e-6, "atol": 100 * close["atol"]}  # small differences of runs
-                assert_allclose(forecast / size, expected / size, **near, err_msg=str(at))
+                # Small differences of runs.
+                assert_allclose(forecast / size, expected / size, rtol=1e-6, atol=100 * close)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from drifting import DEPTH, FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES
 from ensembles import few
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, table
 from xarray.testing import assert_identical
@@ -70,7 +71,7 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     expected = model.forecast(long, START, STEPS)
     # So far they err little, and weigh one; squares of what they err by move the surge.
     near = 1e-9 if len(model.regressors) == len(INPUTS) else 1e-3
-    assert_allclose(table(found, STATES), table(expected, STATES), atol=near)
+    assert_near(table(found, STATES), table(expected, STATES), near)
     # What is missing counts as not there, and what lies beyond it is not read.
     gone = drift.copy(deep=True)
     for name in INPUTS:
@@ -134,7 +135,7 @@ def test_no_lead_errs_more_than_the_mean(drifts, drift, spec, positions):
     assert ratio.max() < 1.01
     assert ratio[:3].max() < 0.2
     # Means before a start are not those of all of the run.
-    assert_allclose(found.heave.values[-20:], mean, atol=0.01 if zero else 1e-12)
+    assert_near(found.heave.values[-20:], mean, 0.01 if zero else 1e-12)
 
 
 def test_where_waves_are_known_nothing_is_weighed(model):
@@ -194,7 +195,7 @@ def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
     for forecast, before, expected in ((3, 2, 4), (-2, 3, 4), (0.5, 3, 1), (0, 0, 1)):
         runs = np.full((1, 1, 5, 2), scale.centre + forecast * scale.spread)
         weight = weighed(runs, expected * errors, scale, unknown, before * scale.spread)[2]
-        assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
+        assert_near(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], 1e-12)
 
 
 def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):
@@ -204,8 +205,8 @@ def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, 
     found = model.forecast_arrays(*arrays_at(model, short, start), steps, ahead="predict")
     known = table(model.forecast(drift, start, steps), STATES)
     given = 101 - LEAD
-    assert_allclose(found[:given], known[:given], rtol=0, atol=1e-9)
-    assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
+    assert_near(found[:given], known[:given], 1e-9)
+    assert_near(found[-20:, 1], model.state_scale.centre[1], 1e-12)
     windows = model.forecast_windows(short, [10.0, start], steps, ahead="predict")
     whole = model.forecast(drift, 10.0, steps)  # all waves of that window were measured
-    assert_allclose(table(windows, STATES), [table(whole, STATES), found], rtol=0, atol=1e-9)
+    assert_near(table(windows, STATES), [table(whole, STATES), found], 1e-9)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from records import record, table
 from said import request_error
@@ -46,7 +47,7 @@ def test_windows_are_forecasts_and_a_history_is_what_the_settings_say(kind, runs
     assert model.history_samples == spec.needs(DT).history + 1
     one = model.forecast(test, start=20.0, steps=40)
     several = model.forecast_windows(test, [20.0, 30.0], 40)
-    assert_allclose(table(several, STATES)[0], table(one, STATES), atol=1e-10)
+    assert_near(table(several, STATES)[0], table(one, STATES), 1e-10)
 
 
 def test_mean_and_hold_last_are_what_they_say_and_read_no_input(runs):
@@ -67,7 +68,7 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     change = {"ridge": 0.0, "order": 5} if kind == "subspace" else {}
     spec = replace(SPECS[kind], **change)
     forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
-    assert_allclose(table(forecast, STATES), table(test, STATES)[201:501], atol=1e-7)
+    assert_near(table(forecast, STATES), table(test, STATES)[201:501], 1e-7)
 
 
 def test_fir_finds_a_known_impulse_response():
@@ -77,7 +78,7 @@ def test_fir_finds_a_known_impulse_response():
     heave, pitch = (np.r_[0.0, np.convolve(u, h)[:1999]] for h in response)
     run = record(DT, heave=heave, pitch=pitch, eta=u)
     model = FIR(input_delays=15, ridge=0.0, standardize=False).fit(run, STATES, ["eta"])
-    assert_allclose(model.coefficients[:, 2:], np.c_[response, np.zeros((2, 4))], atol=1e-10)
+    assert_near(model.coefficients[:, 2:], np.c_[response, np.zeros((2, 4))], 1e-10)
     assert model.spectral_radius == 0.0
     with request_error(r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
@@ -110,7 +111,7 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
     )
     models = [each.fit(given, STATES, INPUTS) for each in (counts, states)]
     assert models[0].settings.ridge == models[1].settings.ridge
-    assert_allclose(models[0].coefficients, models[1].coefficients, rtol=0, atol=1e-9)
+    assert_near(models[0].coefficients, models[1].coefficients, 1e-9)
 
 
 def test_the_recommended_subspace_model_takes_one_state():
@@ -125,4 +126,4 @@ def test_a_subspace_model_without_inputs_continues_the_states():
     swing = np.sin(2 * np.pi * np.arange(400) / 25)
     run = record(DT, {}, heave=swing)
     model = Subspace(6, 0, order=2, ridge=0.0).fit(run, ["heave"], [], stop=19.9)
-    assert_allclose(model.forecast(run, start=25.0, steps=40)["heave"], swing[251:291], atol=1e-4)
+    assert_near(model.forecast(run, start=25.0, steps=40)["heave"], swing[251:291], 1e-4)

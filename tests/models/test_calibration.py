@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, table
 from said import request_error
@@ -19,6 +20,11 @@ NOISY = {"ridge": seakeep.Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
 def sea(seed, samples=1600, name="sea"):
     """In noise by which the members' band is too narrow."""
     return wave_run(seed, samples, name, 1.5)
+
+
+def seas(names):
+    """A sea of its own for each name."""
+    return {name: sea(seed, 500, name) for seed, name in enumerate(names)}
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +83,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
     assert np.all(4 * found.floor > 1.5)  # the noise alone
     half = found.conformal.margin * np.sqrt(std**2 + found.floor**2)
     expected = [mean, mean - half, mean + half]
-    assert_allclose(table(wide, STATES)[[0, 2, 3]], expected, rtol=0, atol=1e-12)
+    assert_near(table(wide, STATES)[[0, 2, 3]], expected, 1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
 
 
@@ -90,7 +96,7 @@ def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble,
     sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
     moved = table(wide, STATES) - table(plain, STATES)
     # One addition: rounding of numbers of about ten.
-    assert_allclose(moved, sides * margin, rtol=0, atol=1e-14 * 10)
+    assert_near(moved, sides * margin, 1e-14 * 10)
     assert wide.attrs["band"] == "calibrated"
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
 
@@ -130,8 +136,8 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     mean, _, _, upper = found = table(one, STATES)
     assert np.all(np.ptp(upper - mean, axis=0) > 0.01 * (upper - mean).mean(axis=0))  # no constant
     # Products of matrices of other sizes: other roundings.
-    assert_allclose(table(several, STATES)[1], found, rtol=0, atol=1e-9)
-    assert_allclose(arrays.upper, upper, atol=1e-9)
+    assert_near(table(several, STATES)[1], found, 1e-9)
+    assert_near(arrays.upper, upper, 1e-9)
     assert "learnt from the members' spread" in one["statistic"].attrs["comment"]
     assert "times a learnt scale and a floor of" in learnt.summary()
 
@@ -149,7 +155,7 @@ def assert_learnt(found, *by_hand):
 
 
 def test_folds_are_forecast_by_what_the_other_runs_teach():
-    runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b", "c"))}
+    runs = seas("abc")
     ensemble = pooled("all", runs)
     with request_error(r"or let each run .* \(folds='run'"):
         ensemble.calibrate(runs, steps=40)
@@ -182,8 +188,7 @@ def test_a_run_that_repeats_the_judged_one_does_not_train():
 
 
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
-    runs = {name: sea(seed, 500, name) for seed, name in enumerate(("a", "b"))}
-    ensemble = pooled("runs", runs)
+    ensemble = pooled("runs", seas("ab"))
     without = ensemble.without("a")
     assert without.arrays.names == ("b",)
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
-from numpy.testing import assert_allclose
+from near import assert_near
 from records import arrays_at, record, table
 from said import request_error
 
@@ -47,12 +47,12 @@ def test_the_system_is_recovered_from_runs_whose_zeros_differ():
     scale = model.state_scale.std
     a = model.A[:2] * scale[:, None] / np.tile(scale, 2)
     # Exact data, through a Gram matrix.
-    assert_allclose(a, np.hstack(A), rtol=0, atol=1e-6)
+    assert_near(a, np.hstack(A), 1e-6)
     run, start = vessel(9, 50.0), DT * (PERIOD + 20)
     found, at = table(model.forecast(run, start, 400), CHANNELS[0]), PERIOD + 21
-    assert_allclose(found, table(run, CHANNELS[0])[at : at + 400], rtol=0, atol=1e-6)
+    assert_near(found, table(run, CHANNELS[0])[at : at + 400], 1e-6)
     values = model.forecast_arrays(*arrays_at(model, run, start), 400)
-    assert_allclose(values, found, rtol=0, atol=1e-9)
+    assert_near(values, found, 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_a_zero_moves_the_forecast_and_changes_nothing_else(spec):
         )
         change = table(other, CHANNELS[0]) - table(one, CHANNELS[0])
         # Differences of numbers of a hundred, through regressions of condition 1e4.
-        assert_allclose(change - [60.0, -8.0], 0.0, atol=1e-7)
+        assert_near(change - [60.0, -8.0], 0.0, 1e-7)
     first, second = (getattr(model, "selection", "") for model in models)
     assert first == second
 
@@ -105,7 +105,7 @@ def test_regressors_depart_from_their_means_over_the_reference_period():
     for name in ("delayed", "direct"):
         mean = getattr(before, name)[:, -PERIOD:].mean(axis=1, keepdims=True)
         expected = getattr(other, name)[:, -50:] - mean
-        assert_allclose(getattr(own, name)[:, -50:], expected, rtol=0, atol=1e-12)
+        assert_near(getattr(own, name)[:, -50:], expected, 1e-12)
 
 
 def test_a_surge_that_is_followed_stays_as_it_is(tmp_path):
@@ -133,7 +133,7 @@ def test_a_surge_that_is_followed_stays_as_it_is(tmp_path):
     run = moved(4, 0.0)
     before, after = first.forecast(run, 80.0, 200), second.forecast(moved(4, 5.0), 80.0, 200)
     change = table(after - before, states) - [5.0 * moves.get(name, 0.0) for name in states]
-    assert_allclose(change, 0.0, atol=1e-7)  # loads of 30 N, by ridge regressions
+    assert_near(change, 0.0, 1e-7)  # loads of 30 N, by ridge regressions
     pooled = replace(spec, centre="pooled").fit(plain, states, inputs)
     assert first.read_windows(run, [80.0], 1).zero[0, 0] == 0.0
     assert first.state_mean[0] == pooled.state_mean[0]

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import drifting_run
+from drifting import drifting_run, drifting_runs
 from numpy.testing import assert_allclose
 from records import record
 from scipy import signal
+from seas import sea
 
 from seakeep import HankelDMDc
 from seakeep.baselines import ARX
@@ -21,8 +22,7 @@ def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, zero=0.0):
     """Heave and pitch of oscillators in irregular waves; heave is measured with another scale."""
     rng = np.random.default_rng(seed)
     time = DT * np.arange(1200)
-    omega = 2 * np.pi * rng.uniform(0.5, 1.1, 30)
-    eta = np.cos(np.outer(time, omega) + rng.uniform(0, 2 * np.pi, 30)).sum(axis=1) / 10
+    eta = 0.4 * sea(seed, (0.5, 1.1), components=30).at(time)
     heave = signal.lfilter([0.0, stiffness], [1.0, stiffness - 1.75, 0.75], eta)
     pitch = signal.lfilter([0.0, 0.0, 0.1], [1.0, -1.6, 0.75], eta)
     channels = {"heave": factor * heave + offset, "pitch": pitch, "eta": eta + zero}
@@ -100,7 +100,7 @@ def test_an_offset_is_named_also_for_a_model_with_a_memory():
 
 
 def test_a_probe_that_was_moved_is_found_with_its_distance():
-    runs = {f"run{seed}": drifting_run(seed) for seed in (1, 2, 3)}
+    runs = drifting_runs(3)
     runs["moved"] = drifting_run(4, moved=1.5)
     spec = HankelDMDc(10, 40, 1e-4, delay_rows="exact", ridge_scale="per_snapshot")
     (moved,) = disagreements(spec, runs, ["heave"], ["eta_fwd", "eta_cog"])

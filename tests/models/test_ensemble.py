@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
+from near import assert_near
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, fed, record, table
@@ -50,21 +51,21 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     moved = expected - wanted[0]
     assert np.abs(moved).max() > 1e-3
     wanted[[0, 2, 3]] += moved  # all but the standard deviation
-    close = {"rtol": 0, "atol": 1e-12}  # rounding of the sums
-    assert_allclose(table(centred.forecast_summary(unseen, 65.0, 120), STATES), wanted, **close)
+    close = 1e-12  # rounding of the sums
+    assert_near(table(centred.forecast_summary(unseen, 65.0, 120), STATES), wanted, close)
     x, u, ahead = arrays_at(centred, unseen, 65.0)
-    assert_allclose(centred.hold().forecast_arrays(x, u, ahead, 120)[:4], wanted, **close)
+    assert_near(centred.hold().forecast_arrays(x, u, ahead, 120)[:4], wanted, close)
     live = fed(centred.live(), u, x)
     mean, std, *_ = table(live.forecast(120, ahead), STATES)
-    assert_allclose(mean, expected, **close)
+    assert_near(mean, expected, close)
     one_step = table(single.forecast(unseen, 64.6, 1), STATES)[0]
-    assert_allclose(live.innovation, x[-4] - one_step, **close)  # three wait for waves ahead
+    assert_near(live.innovation, x[-4] - one_step, close)  # three wait for waves ahead
     both = np.hypot(wanted[1], live.errors.at(np.arange(1, 121)))  # of members, and of any model
     assert_allclose(std, both, rtol=1e-9)
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
     two = settings.fit({name: runs[name] for name in "ac"}, STATES, INPUTS)
     expected = table(two.forecast(unseen, 65.0, 120), STATES)
-    assert_allclose(table(left, STATES)[0], expected, **close)
+    assert_near(table(left, STATES)[0], expected, close)
 
 
 def test_draws_are_rounded_to_the_nearest_sample(run):
@@ -138,9 +139,9 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     for window, start in enumerate(starts):
         single = ensemble.forecast(run, start=start, steps=60)
         # Two windows are one product: other roundings.
-        assert_allclose(table(together, STATES)[window], table(single, STATES), atol=1e-10)
+        assert_near(table(together, STATES)[window], table(single, STATES), 1e-10)
     judged, _ = ensemble.judged_runs(run, "run", [650, 703], 60)
-    assert_allclose(judged, table(together, STATES).mean(axis=1), atol=1e-10)
+    assert_near(judged, table(together, STATES).mean(axis=1), 1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
     expected = seakeep.summarize(together)
     assert_array_equal(table(summary, STATES), table(expected, STATES))
@@ -163,7 +164,7 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     assert draws.last_sample.max() <= 600
     last = float(run.time[int(draws.last_sample[1])])
     expected = HankelDMDc(8, 16, 1.0, window=160).fit(run, STATES, INPUTS, stop=last)
-    assert_allclose(ensemble.member(1).A, expected.A, atol=1e-10)
+    assert_near(ensemble.member(1).A, expected.A, 1e-10)
     assert ensemble.member(1).training.stop == pytest.approx((last,))
     shortest = run.isel(time=slice(0, 160 + 16))  # which leaves one place for the window
     found = small(train_on="windows", **fixed).fit(shortest, STATES, INPUTS)

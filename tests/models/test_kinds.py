@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from free_runs import held_out_scores
+from near import assert_near
 from oscillators import OF_ARX, arx_run
 from squared import INPUTS, PERIOD, STATES, runs
 
@@ -62,7 +63,7 @@ def test_a_kind_that_is_better_beyond_the_noise_is_taken_by_tune():
     model = result.settings.fit(given, *OF_ARX)
     taps = model.B[0] * model.state_std / model.input_std
     # Of 4 runs of 200 samples in noise of SD 1.2: to 0.04 each.
-    np.testing.assert_allclose(taps, [*b, 0.0], rtol=0, atol=0.12)
+    assert_near(taps, [*b, 0.0], 0.12)
 
 
 def test_recommended_names_a_subspace_model_where_noise_spoils_delayed_states():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from drifting import FOLLOWED, INPUTS, SQUARES, STATES
 from ensembles import few
+from near import assert_near
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from records import fed, record, rms, table
@@ -25,6 +26,7 @@ from seakeep.study import nowcast
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
+LAST = 49.9  # s, the newest of them
 SETTINGS = {
     "plain": {},
     "lead": {"lead": 6},
@@ -101,26 +103,26 @@ def test_fed_with_everything_it_is_the_forecast(models, drift, key, motions):
     model = models[key]
     live = started(model, drift)
     found = driven(live, drift)
-    expected = model.forecast(drift, start=float(drift.time[START - 1]), steps=STEPS)
+    expected = model.forecast(drift, start=LAST, steps=STEPS)
     # The same numbers go through the same products; an instant differs by the rounding of its sum.
     assert_array_equal(mean(found), table(expected, STATES))
     assert_array_equal(live.state, motions[START - 1])
     assert not live.covariance.any()
     play(live, drift, START, START + max(model.signature.lead_samples, 1))  # and then it is final
     # One-step predictions in physical units, and the forecast in deviations: rounding.
-    assert_allclose(live.innovation, motions[START] - table(expected, STATES)[0], rtol=0, atol=1e-9)
+    assert_near(live.innovation, motions[START] - table(expected, STATES)[0], 1e-9)
 
 
 def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(
     model, live, drift, waves
 ):
     lost = 120
-    expected = table(model.forecast(drift, start=float(drift.time[START - 1]), steps=lost), STATES)
+    expected = table(model.forecast(drift, start=LAST, steps=lost), STATES)
     for since in range(1, lost + 1):
         at = START + since - 1
         (estimate,) = play(live, drift, at, at + 1, lost=[at])
         # One-step predictions in physical units, and the forecast in deviations: rounding adds up.
-        assert_allclose(estimate, expected[since - 1], rtol=0, atol=1e-9)
+        assert_near(estimate, expected[since - 1], 1e-9)
         assert_allclose(np.sqrt(np.diagonal(live.covariance)), model.errors.at(since), rtol=1e-9)
     found = live.forecast(10, waves[START + lost :])
     assert_allclose(std(found), model.errors.at(lost + np.arange(1, 11)), rtol=1e-9)
@@ -212,10 +214,10 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     # alike within some dozens of samples, of 1 ± 0.4.
     assert sound.consistency == pytest.approx(1.0, abs=0.3)
     one_step, free = sound.consistency_by_state
-    assert_allclose(one_step, 1.0, atol=0.3)
+    assert_near(one_step, 1.0, 0.3)
     assert np.all((free > 0.2) & (free < 2.2))
     one_step, (sway, heave) = drifting.consistency_by_state
-    assert_allclose(one_step, [1.49, 1.0], atol=0.4)
+    assert_near(one_step, [1.49, 1.0], 0.4)
     # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
     assert sway > 5 > 2.2 > heave > 0.2
     assert drifting.consistency == pytest.approx(drifting.consistency_by_state.mean())
@@ -383,10 +385,10 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, drifts, d
             assert expected["heave"].std("member").values[-1] > 0  # a band stays
             expected = expected.mean("member")
         found = started(model, cut).forecast(steps)
-        assert_allclose(mean(found), table(expected, STATES), rtol=0, atol=1e-9)
+        assert_near(mean(found), table(expected, STATES), 1e-9)
         # By then all weight is on the mean of training, which errs by the SD there.
         scale = model.signature.state_scale
-        assert_allclose(mean(found)[-1, 1], scale.centre[1], rtol=0, atol=1e-9)
+        assert_near(mean(found)[-1, 1], scale.centre[1], 1e-9)
         assert_allclose(std(found)[-20:, 1], scale.spread[1], rtol=1e-9)
 
 
@@ -431,7 +433,7 @@ def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, tmp_pa
     assert found.attrs["known_input"] == 0
     for each in ("mean", "std"):
         # What is predicted from is the same, but for the oldest samples of a full record.
-        assert_allclose(mean(found, each), mean(before, each)[count:], rtol=0, atol=2e-3)
+        assert_near(mean(found, each), mean(before, each)[count:], 2e-3)
     play(live, drift, START + count, START + count + 8)
     assert live.validity & Validity.LOST  # thirty samples are no gap that is closed
     play(live, drift, START + count + 8, START + count + models[key].history_samples)
@@ -631,7 +633,7 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     answer = signal.lfilter([0.5], [1, -0.9], np.concatenate([[0.0], plan[:-1]]))
     change = (moved.surge - still.surge).drop_sel(statistic="std")
     # The ridge moves the answer by a millionth.
-    assert_allclose(change, [answer] * 3, rtol=0, atol=1e-5)
+    assert_near(change, [answer] * 3, 1e-5)
     # Extremes of training are −1 and 1, mean and 3 SD about 1.7.
     for plan_of, word in ((1.2, False), (-1.2, False), (2.2, True), (-2.2, True)):
         ahead = live.forecast(steps, {"thrust": np.append(plan_of, 0 * plan[1:])})
@@ -645,7 +647,7 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     known[:, 1] = u[299, 1]
     expected = model.forecast_arrays(y[:300], u[:300], known, steps)
     given = constant.forecast(steps, {"eta": u[300:340, 0]})
-    assert_allclose(given.surge.sel(statistic="mean"), expected[:, 0], atol=1e-12)
+    assert_near(given.surge.sel(statistic="mean"), expected[:, 0], 1e-12)
     assert given.attrs["known_input"] == 39
 
 

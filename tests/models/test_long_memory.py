@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from near import assert_near
 from oscillators import OF_ARX, arx_run
 from said import request_error
 
@@ -23,10 +23,10 @@ def remembering(seed, samples=300):
 def test_a_sparse_memory_is_recovered():
     model = SPEC.fit([remembering(1), remembering(2)], *OF_ARX)
     # Exact data: what is left is rounding times the condition number, below 1e3.
-    assert_allclose([*model.A[0], *model.B[0]], [*WEIGHTS, 0.7], rtol=0, atol=1e-10)
+    assert_near([*model.A[0], *model.B[0]], [*WEIGHTS, 0.7], 1e-10)
     run = remembering(7)
     forecast = model.forecast(run, start=5.0, steps=200)
-    assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-9)
+    assert_near(forecast.heave, run.heave[51:251], 1e-9)
 
 
 @pytest.mark.parametrize("more", [{"delay_rows": "ridge"}, {"stable": True}])

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from numpy.testing import assert_allclose, assert_array_equal
+from near import assert_near
+from numpy.testing import assert_array_equal
 from oscillators import OF_ARX, arx_run
 from records import arrays_at, rms
 from said import data_error, request_error, warned
@@ -55,19 +56,19 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     run = vessel(0.7, 3)
     at = model.at(parameter=0.7)
     # Exact data: λ is the rounding of the Gram matrix, 1e-13 of its largest entry.
-    assert_allclose(at.A[0], ON_STATE[0] + 0.7 * ON_STATE[1], rtol=0, atol=1e-8)
-    assert_allclose(at.B[0], [ON_WAVE[0] + 0.7 * ON_WAVE[1]], rtol=0, atol=1e-8)
+    assert_near(at.A[0], ON_STATE[0] + 0.7 * ON_STATE[1], 1e-8)
+    assert_near(at.B[0], [ON_WAVE[0] + 0.7 * ON_WAVE[1]], 1e-8)
     forecast = model.forecast(run, start=5.0, steps=200)
-    assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-6)
+    assert_near(forecast.heave, run.heave[51:251], 1e-6)
     again = load_model(model.save(tmp_path / "model.nc"))
     xr.testing.assert_identical(again.forecast(run, start=5.0, steps=200), forecast)
     assert "parameter     rig.draught, trained from 0 to 1" in again.summary()
     # Its errors are those at each value, and of the file too.
-    assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
+    assert_near(model.errors.rms, 0.0, 1e-6)
     served = [each.at(parameter=0.7).live(like=run).errors for each in (model, again)]
     assert_array_equal(served[0].rms, served[1].rms)
     arrays = at.forecast_arrays(*arrays_at(at, run, 5.0), 200)
-    assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
+    assert_near(arrays[:, 0], forecast.heave, 1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):
@@ -77,7 +78,7 @@ def test_windows_of_several_runs_take_the_value_of_each(model):
     for (name, start), values in zip(places, together, strict=True):
         alone = model.forecast(runs[name], start, 50)
         # Windows side by side are summed in another order.
-        assert_allclose(values[:, 0], alone.heave, rtol=0, atol=1e-12)
+        assert_near(values[:, 0], alone.heave, 1e-12)
 
 
 def test_means_follow_the_parameter():

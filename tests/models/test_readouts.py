@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_runs
 from drifting import STATES as MOTIONS
 from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
 from moored import INPUTS as ETA
 from moored import STATES as MOORED
-from numpy.testing import assert_allclose, assert_array_equal
+from near import assert_near
+from numpy.testing import assert_array_equal
 from records import rms, table
 from said import request_error
 from xarray.testing import assert_identical
@@ -33,7 +34,7 @@ def bow(kind):
 
 @pytest.fixture(scope="module")
 def runs():
-    return {f"run{seed}": drifting_run(seed) for seed in (1, 2, 3)}
+    return drifting_runs(3)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_the_wave_at_the_line_is_that_of_the_tank(chosen, drift):
     assert np.count_nonzero(above) > 50
     height = wave[above] - wet[above]  # half a standard deviation, less errors of carriers
     assert height.std() < 0.1 * wave.std()
-    assert_allclose(rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), atol=0.05 * rate.std())
+    assert_near(rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), 0.05 * rate.std())
 
 
 def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):

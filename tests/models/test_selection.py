@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
-from drifting import drifting_run
+from drifting import drifting_runs
 from free_runs import held_out_scores
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from oscillators import OF_ARX, arx_run
 from records import record
@@ -69,13 +70,13 @@ def test_free_runs_side_by_side_score_as_one_after_the_other(monkeypatch):
         for one, (scores, weights) in zip(tried, found, strict=True):
             ((alone, own),) = judge(problem, [one], fold)
             # Products of matrices are summed in another order.
-            assert_allclose(scores, alone, rtol=0, atol=1e-9)
+            assert_near(scores, alone, 1e-9)
             assert_array_equal(weights, own)
         batches.append(len(tried))
         return found
 
     monkeypatch.setattr(Problem, "judge", both)
-    given = {f"run{seed}": drifting_run(seed, 900) for seed in (1, 2)}
+    given = drifting_runs(2, 900)
     spec = HankelDMDc(
         4, 12, "rollout", delay_rows="exact", lead=6, select=Select(observables=True),
         alignment=ProbeAlignment(mode="dispersion", surge="predicted"),
@@ -193,7 +194,7 @@ def test_what_grows_is_never_chosen():
 
 
 def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_choice():
-    given = {f"run{seed}": drifting_run(seed, samples=600) for seed in (1, 2)}
+    given = drifting_runs(2, 600)
     spec = HankelDMDc(4, 12, "rollout", delay_rows="exact")
     options = {"vary": ("alignment",), "horizon": (15.0,)}
     found = select(spec, given, DRIFTING, PROBES, **options)

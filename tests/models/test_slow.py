@@ -26,7 +26,8 @@ def run_of(seed, seconds, slow=1.0, regular=False):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_period_of_a_slow_drift_is_found(seed):
-    (found,) = slow_motions({"a": run_of(seed, 600)}, ["heave", "surge"], 33.0, PERIOD)
+    runs = {"a": run_of(seed, 600), "b": run_of(seed + 9, 600)}
+    (found,) = slow_motions(runs, ["heave", "surge"], 33.0, PERIOD)
     assert found.channel == "surge"
     # The drift's own frequencies lie within ±20 %, and so does their mean in any realisation.
     assert found.period == pytest.approx(30.0, rel=0.2)

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ensembles import few
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
-from oscillators import Oscillator
+from oscillators import Oscillator, growing_model
 from records import record
 from said import warned
 
@@ -47,8 +48,7 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(factor, scale):
     # The growth of the model is set by hand: what is tested is the end of the run, whatever the
     # speed it comes at and the unit it comes in. Warnings are errors in this suite.
     run = growing(scale=scale)
-    model = HankelDMDc(0, 0, 1e-9, delay_rows="exact").fit(run, ["heave"], ["eta_fwd"])
-    model = replace(model, coefficients=np.array([[factor, 0.0]]))
+    model = growing_model(run, factor)
     long = run.pad(time=(0, 1000), mode="wrap").assign_coords(time=0.1 * np.arange(1060))
     forecast = model.forecast(long, start=1.0)
     lost = np.isnan(forecast.heave.values)
@@ -80,7 +80,7 @@ def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stabl
     model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])
     found = model.eigenvalues
     assert model.spectral_radius == pytest.approx(radius, rel=1e-9)
-    assert_allclose(found[1:], grows[1:], atol=1e-9)
+    assert_near(found[1:], grows[1:], 1e-9)
     assert model.training.clipped == pytest.approx([abs(grows[0])], rel=1e-9)
     told = f"1 eigenvalue clipped to {radius:g}; the largest was {abs(grows[0]):.6f}"
     assert told in model.summary()

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, FOLLOWED, INPUTS, OBSERVABLES, drifting_run
-from numpy.testing import assert_allclose
+from drifting import DT, FOLLOWED, INPUTS, OBSERVABLES, drifting_run, drifting_runs
+from near import assert_near
 from records import arrays_at, fed, table
 from said import data_error
 from xarray.testing import assert_identical
@@ -46,7 +46,7 @@ def settings(key):
 
 @pytest.fixture(scope="module")
 def runs():
-    return [drifting_run(seed, 1200) for seed in (1, 2)]
+    return drifting_runs(2, 1200)
 
 
 @pytest.fixture(scope="module")
@@ -81,17 +81,17 @@ def reads_surge(model):
 
 def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     # The same sums in another order, of loads of 30 N.
-    close = {"rtol": 0, "atol": 1e-11}
+    close = 1e-11
     several = model.forecast_windows(run, [START * DT, 50.0], STEPS)
-    assert_allclose(table(several, STATES)[0], table(expected, STATES), **close)
+    assert_near(table(several, STATES)[0], table(expected, STATES), close)
     carried = reads_surge(model)
     if carried:  # as a whole record, and not up to the end of the forecast
-        run, close["atol"] = run.assign(model.aligned_inputs(run)), 1e-6
+        run, close = run.assign(model.aligned_inputs(run)), 1e-6
     x, u, ahead = arrays_at(model, run, START * DT)
-    assert_allclose(model.forecast_arrays(x, u, ahead, STEPS), table(expected, STATES), **close)
+    assert_near(model.forecast_arrays(x, u, ahead, STEPS), table(expected, STATES), close)
     if not carried:
         served = fed(model.live(like=run), u, x).forecast(STEPS, ahead).isel(statistic=0)
-        assert_allclose(table(served, STATES), table(expected, STATES), **close)
+        assert_near(table(served, STATES), table(expected, STATES), close)
 
 
 def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_path):
@@ -114,10 +114,10 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
         read = dict(model.settings.readouts)  # once for all members, with the medians of delays
         plain = [name for name in STATES if name not in read]
         # One arithmetic in another order.
-        assert_allclose(table(mine, STATES), table(own, STATES), atol=1e-9)
+        assert_near(table(mine, STATES), table(own, STATES), 1e-9)
         if model.signature.input_map.follows is None and not spec.observables:
             # Places and observables are learnt once for all members.
-            assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
+            assert_near(table(mine, plain), table(wanted, plain), 1e-9)
     for same in (load_model(ensemble.save(tmp_path / "e.nc")), ensemble.hold()):
         assert_identical(forecast_of(same, run), found)
 
@@ -140,11 +140,13 @@ def test_training_reads_its_window_and_nothing_else(runs, run, model, expected):
     settings = model.settings
     history = 0 if settings.history == "inside" else model.history_samples
     first = 200 - history if settings.window else 0
-    found = settings.fit([each.isel(time=slice(first, 1101)) for each in runs], STATES, INPUTS)
+    found = settings.fit(
+        [each.isel(time=slice(first, 1101)) for each in runs.values()], STATES, INPUTS
+    )
     # BLAS sums in an order that follows the memory.
-    assert_allclose(found.coefficients, model.coefficients, rtol=0, atol=1e-11)
+    assert_near(found.coefficients, model.coefficients, 1e-11)
     again = table(forecast_of(found, run), STATES)
-    assert_allclose(again, table(expected, STATES), rtol=0, atol=1e-9)
+    assert_near(again, table(expected, STATES), 1e-9)
 
 
 def test_files_and_tables_of_settings_hold_it_all(model, run, expected, tmp_path):

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from near import assert_near
+from numpy.testing import assert_array_equal
 from records import record, table
 from scipy import signal
 
@@ -40,7 +41,7 @@ def test_matrices_and_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z)
     pipeline.fit(data, n_inputs=len(INPUTS), episode_feature=True)
     if not relift:
         found = np.hstack([model.A, model.B])
-        assert_allclose(found, pipeline.regressor_.coef_.T, rtol=0, atol=SAME_MATRICES)
+        assert_near(found, pipeline.regressor_.coef_.T, SAME_MATRICES)
     first = model.history_samples
     expected = pipeline.predict_trajectory(
         table(other, STATES)[:first],
@@ -49,7 +50,7 @@ def test_matrices_and_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z)
         episode_feature=False,
     )
     forecast = model.forecast(other, start=float(other.time[first - 1]), steps=160 - first)
-    assert_allclose(table(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST)
+    assert_near(table(forecast, STATES), expected[first:], SAME_FORECAST)
 
 
 @pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3), (5, 0), (3, 1)])
@@ -69,8 +70,8 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, d
     physical = signal.dlsim(system, deviations, x0=state)[1] + model.state_mean
     forecast = model.forecast(run, start=float(run.time[start]), steps=steps)
     # The first output is the measured state at the start; values are of order one.
-    assert_allclose(physical[0], x[start], rtol=0, atol=1e-12)
-    assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
+    assert_near(physical[0], x[start], 1e-12)
+    assert_near(physical[1:], table(forecast, STATES), 1e-10)
 
 
 def test_a_system_of_python_control_has_the_step_and_the_names(run):
@@ -105,4 +106,4 @@ def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     # Fewer columns than rows; with all rows regressed the primal form is still less work.
     assert model.training.method == "primal"
     # The primal inverse at this size, condition number near 1e4, is good to about 1e-12.
-    assert_allclose(np.hstack([model.A, model.B]), g, rtol=0, atol=1e-10)
+    assert_near(np.hstack([model.A, model.B]), g, 1e-10)
