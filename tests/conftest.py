@@ -1,5 +1,6 @@
 """What tests share: runs made of known systems, and what keeps a busy machine from failing them."""
 
+import importlib.util
 import os
 import signal as signals
 
@@ -85,13 +86,15 @@ def study_folder(tmp_path):
 
 
 @pytest.fixture
-def empty_sheet(monkeypatch):
-    """Sheets with empty pictures: tests/report looks at these, and each takes a second or two."""
-    pytest.importorskip("matplotlib")
-    from seakeep.report import quality_sheet as sheet
-    from seakeep.report.style import new_figure
+def empty_figures(monkeypatch):
+    """Empty pictures of runs: tests/report looks at these, and each takes a second or two."""
+    if importlib.util.find_spec("matplotlib") is None:
+        return
+    from seakeep.report import quality_sheet
+    from seakeep.report.figures import histories
 
-    monkeypatch.setattr(sheet, "quality_figure", lambda run, agreements: new_figure(1, 1))
+    for module, name in ((histories, "overlay_figure"), (quality_sheet, "quality_figure")):
+        monkeypatch.setattr(module, name, lambda *_: histories.new_figure(1, 1))
 
 
 @pytest.fixture

@@ -9,10 +9,9 @@ from seakeep import read_campaign
 
 @pytest.fixture
 def tank(tmp_path):
-    """Folder with ``first.csv``, ``second.csv`` and ``campaign.toml``."""
+    """Folder with ``first.csv`` and ``second.csv``."""
     for seed, name in enumerate(("first", "second")):
         write_csv(tmp_path / f"{name}.csv", tank_columns(seed))
-    (tmp_path / "campaign.toml").write_text(CAMPAIGN, "utf-8")
     return tmp_path
 
 

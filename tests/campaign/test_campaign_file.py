@@ -22,13 +22,6 @@ MISTAKES = [
         "Keys here: column, instrument, unit, unit_assumed, sign, offset, accuracy, long_name.",
     ),
     (
-        "[preparation]",
-        "[preperation]",
-        "preperation: unknown key, received a table with sampling_rate. Did you mean "
-        "'preparation'? Keys here: campaign, rig, files, channels, derived, instruments, "
-        "redundant, runs, preparation, model, models.",
-    ),
-    (
         'role = "test"',
         'role = "tset"',
         "runs.second.role: received 'tset', which should be 'train', 'test' or 'unused'. "

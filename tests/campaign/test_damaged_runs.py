@@ -23,14 +23,12 @@ NOTE = (
 @pytest.mark.parametrize("content", [CUT, b"", bytes(range(256)), None])
 def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, tank, content):
     campaign = changed(POOLED)
-    both = campaign.encounter_period()
     damaged, kept = tank / "second.csv", tank / "prepared/first.nc"
     damaged.unlink() if content is None else damaged.write_bytes(content)
     with warned(NOTE):
         run = campaign.prepare(["first"])["first"]
     alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
     assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
-    assert abs(alone / both - 1) > 1e-3
     told = findings(run, "LEFT_OUT")
     assert [each.channel for each in told] == ["run second"]
     assert "run 'second' is left out of the encounter period" in told[0].text
@@ -47,9 +45,10 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     assert not findings(load_prepared(campaign)["first"], "LEFT_OUT")
 
 
-@pytest.mark.usefixtures("empty_sheet")
+@pytest.mark.usefixtures("empty_figures")
 def test_the_commands(edited, tank, command):
     """prepare keeps what it can and ends with the error; fit and forecast of others run."""
+    pytest.importorskip("matplotlib")
     path = edited(POOLED)
     (tank / "second.csv").write_bytes(CUT)
     out, told = command("prepare", path, status=1)

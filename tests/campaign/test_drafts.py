@@ -122,9 +122,8 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path, drafted):
 
 def test_a_draft_asks_whether_slow_files_count_milliseconds(drafted):
     for rate, asks in ((50, False), (0.05, True)):
-        t = np.arange(600) / rate
-        wave = {"t": t, "WP fwd [mm]": np.sin(tau * np.arange(600) / 30)}
-        text, _ = drafted(wave)
+        count = np.arange(600)
+        text, _ = drafted({"t": count / rate, "WP fwd [mm]": np.sin(tau * count / 30)})
         assert f"# the files have {rate} samples per second" in text
         assert ("time_unit = 'ms'" in text) is asks
 
@@ -136,8 +135,7 @@ def test_a_draft_tells_days_and_midnights(tmp_path, drafted, loggers):
     t = 86390.0 + columns.pop("Time [s]")
     of_day = {"PLC time": np.round(t % 86400, 3), "load [N]": np.cos(t)}
     mru = write_csv(tmp_path / "mru.csv", {"Time": 45415 + t / 86400, **columns})
-    plc = write_csv(tmp_path / "plc.csv", of_day)
-    text, campaign = drafted([mru, plc][:loggers])
+    text, campaign = drafted([mru, write_csv(tmp_path / "plc.csv", of_day)][:loggers])
     settings = campaign.settings
     own = settings.instruments["mru"] if loggers > 1 else settings.files
     assert own.time_unit == "d"
@@ -154,8 +152,8 @@ def test_times_that_jitter_are_told_by_a_word_of_their_name(drafted, header, fac
     columns = tank_columns()
     even = columns.pop("Time [s]")
     jitter = default_rng(0).uniform(-0.004, 0.004, even.size)
-    content = {"carriage": 1.5 * even, header: factor * (even + jitter), **columns}
-    text, campaign = drafted(content)
+    times = {"carriage": 1.5 * even, header: factor * (even + jitter)}
+    text, campaign = drafted(times | columns)
     assert campaign.settings.files.time == header
     assert campaign.settings.files.sampling_rate is None
     assert "# the files have 50.0" in text
@@ -230,10 +228,9 @@ def test_files_of_several_loggers(tmp_path, drafted, pattern, runs):
     assert campaign.settings.instruments.reference == "wave_probes"
     assert ('waves = "regular" # guessed' in text) is ("regular_3" in runs)
     assert ("guessed: loggers of one run" in text) is (len(runs) == 1)
-    prepared = campaign.prepare()
-    assert list(prepared) == list(runs)
     # Half of a sample: the pulses' edges lie between samples.
-    assert abs(prepared["a1"].attrs["clock_mru_offset"]) == pytest.approx(0.5, abs=0.01)
+    found = campaign.prepare()["a1"].attrs["clock_mru_offset"]
+    assert abs(found) == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize("lost", [20, 200])  # of 1001 samples: a channel with gaps, and none

@@ -88,8 +88,7 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
     gapped = {name: each[kept] for name, each in rows.items()}
     found, whole = (sent(chain_of(campaign), each) for each in (gapped, rows))
     assert_array_equal(found["time"], whole["time"])
-    inside = (found["time"] > 20.1) & (found["time"] < 22.9)
-    assert found["heave"].isel(time=inside).isnull().all()
+    assert found["heave"].isel(time=(found["time"] > 20.1) & (found["time"] < 22.9)).isnull().all()
     after = found["time"] > 40.0
     for name in ("heave", "eta_fwd"):
         left = (found[name] - whole[name]).isel(time=after).std() / whole[name].std()
@@ -114,8 +113,7 @@ def test_seconds_of_day_go_on_counting_over_each_midnight(campaign, rows):
         ):
             sent = {name: each[part] for name, each in rows.items()}
             expected = whole.push({"": sent | {"t": counted[part] - counted[0] + told[0]}})
-            found = fallen.push({"": sent | {"t": told[part]}})
-            xr.testing.assert_identical(found, expected)
+            xr.testing.assert_identical(fallen.push({"": sent | {"t": told[part]}}), expected)
         with request_error("do not increase.*Send each row once"):
             fallen.push({"": sent | {"t": told[part]}})
 

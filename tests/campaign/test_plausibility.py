@@ -107,8 +107,8 @@ def test_clocks_of_which_nothing_is_said_are_assumed_the_same(loggers, tmp_path)
     found = told(loggers().prepare()["first"], *CLOCKS)
     assert [channel for channel, _ in found] == ["mru"]
     assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
-    stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
-    path = edit(tmp_path / "campaign.toml", stated)
+    path = tmp_path / "campaign.toml"
+    edit(path, ("[instruments.mru]", "[instruments.mru]\noffset = 0"))
     assert not told(read_campaign(path).prepare()["first"], *CLOCKS)
 
 
@@ -119,8 +119,7 @@ def test_clocks_of_which_nothing_is_said_are_assumed_the_same(loggers, tmp_path)
      'time = "Time"\nsampling_rate = 50': None, "sampling_rate = 50": None}.items(),
 )  # fmt: skip
 def test_a_rate_against_the_times(first, files, text):
-    run = first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
-    found = told(run, *CLOCKS)
+    found = told(first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")), *CLOCKS)
     assert [each[0] for each in found] == ([] if text is None else ["time"])
     assert text is None or found[0][1].startswith(text)
 
@@ -176,8 +175,7 @@ def test_a_motion_from_a_column_of_waves(first):
      **dict.fromkeys(f"sampling_rate = {rate}" for rate in (10, 3, 100))}.items(),
 )  # fmt: skip
 def test_what_a_coarse_step_loses_is_told(first, chain, fate):
-    run = first(("sampling_rate = 10", chain))
-    found = dict(told(run, "COARSE_STEP", "FINE_STEP"))
+    found = dict(told(first(("sampling_rate = 10", chain)), "COARSE_STEP", "FINE_STEP"))
     assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
     assert fate is None or re.search(fate, found["eta_fwd"])
 
@@ -227,8 +225,7 @@ def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(loggers, ends,
 def test_a_test_part_without_samples_is_an_error(loggers, test):
     """It would else be judged on the part that trains."""
     campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
-    message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
-    with data_error(message):
+    with data_error(r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"):
         campaign.prepare()
 
 
@@ -244,8 +241,7 @@ def test_faults_outside_the_span_are_none_of_the_run(changed, tank, role, places
     columns["Pitch (deg)"][690:] = columns["Pitch (deg)"][690]
     write_csv(tank / "second.csv", columns)
     run = changed(("span = [2, 18]", role)).prepare(["second"])["second"]
-    flagged = findings(run, "OUTLIERS", "STUCK")
-    assert [each.place for each in flagged] == pytest.approx(places)
+    assert [each.place for each in findings(run, "OUTLIERS", "STUCK")] == pytest.approx(places)
 
 
 COUNTED = ("sampling_rate = 10", "steps_per_period = 12")

@@ -79,8 +79,7 @@ def test_still_water_and_noise_place_no_probes(campaign, tmp_path):
     still = {f"{probe} [m]": 1e-3 * rng.standard_normal(time.size) for probe in PLACES}
     write_csv(path, {"time [s]": time, **still})
     for waves in ("still", "irregular"):
-        run = campaign(-400.0, waves).prepare(["two"])["two"]
-        assert not findings(run, "POSITION")
+        assert not findings(campaign(-400.0, waves).prepare(["two"])["two"], "POSITION")
 
 
 def test_a_probe_in_another_unit_is_kept_until_its_file_is_repaired(campaign, tmp_path):
@@ -101,6 +100,5 @@ def test_a_probe_in_another_unit_is_kept_until_its_file_is_repaired(campaign, tm
 
 
 def test_right_positions_and_regular_waves_give_no_finding(campaign):
-    runs = campaign(48.42).prepare()
-    assert not any(findings_of(run) for run in runs.values())
+    assert not any(map(findings_of, campaign(48.42).prepare().values()))
     assert not findings_of(campaign(48.24, "regular").prepare(["two"])["two"])

@@ -23,15 +23,8 @@ from seakeep.signals import (
 
 
 @pytest.fixture
-def campaign(tank):
-    return read_campaign(tank / "campaign.toml")
-
-
-def rewrite(tank, change, name="second.csv"):
-    columns = tank_columns(1)
-    change(columns)
-    write_csv(tank / name, columns)
-    return read_campaign(tank / "campaign.toml")
+def campaign(changed):
+    return changed()
 
 
 def test_raw_run_is_in_si_units(campaign):
@@ -111,10 +104,9 @@ def test_each_file_is_parsed_once(changed, monkeypatch):
 
 def test_the_whole_record_is_resampled_and_then_cut(campaign):
     raw = campaign.read_run("second")
-    run = campaign.prepare(["second"])["second"]
     whole = resample(raw["pitch_rate"], raw["time"], np.arange(201) * 0.1)
     # Channels side by side are summed in another order.
-    assert_allclose(run["pitch_rate"], whole[20:181], atol=1e-14)
+    assert_allclose(campaign.prepare(["second"])["second"]["pitch_rate"], whole[20:181], atol=1e-14)
 
 
 def test_derived_at_the_files_own_rate(changed):
@@ -168,23 +160,20 @@ def test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of
     columns = tank_columns(1)
     write_csv(tank / "second.csv", columns | {"Time [s]": 1000 * columns["Time [s]"]})
     failed = {}
-    campaign = changed()
-    assert [name for name, _ in campaign.each_prepared(None, None, failed)] == ["first"]
+    assert [name for name, _ in changed().each_prepared(None, None, failed)] == ["first"]
     assert "'second' has 0.05 samples per second by its times, and [preparation] asks for 10. " in (
         str(failed["second"])
     )
     assert changed(("sampling_rate = 10", "sampling_rate = 400")).prepare(["first"])
 
 
-def test_steps_of_files_that_differ_are_refused(edited, tank):
-    edited(("sampling_rate = 10", ""))
-    columns = {name: each[::2] for name, each in tank_columns(1).items()}
-    write_csv(tank / "second.csv", columns)
+def test_steps_of_files_that_differ_are_refused(changed, tank):
+    write_csv(tank / "second.csv", {name: each[::2] for name, each in tank_columns(1).items()})
     with request_error(
         r"the runs differ in rate: 'first' has a step of 0\.02 s and 'second' one of "
         r"0\.04 s\. State sampling_rate"
     ):
-        read_campaign(tank / "campaign.toml").prepare()
+        changed(("sampling_rate = 10", "")).prepare()
 
 
 def test_the_period_is_the_mean_of_the_irregular_runs(changed):
@@ -227,9 +216,9 @@ def test_a_period_needs_a_wave_channel(changed):
         campaign.encounter_period()
 
 
-def test_still_water_has_no_period(tank):
+def test_still_water_has_no_period(tank, campaign):
     for name in ("first.csv", "second.csv"):
-        campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), name)
+        write_csv(tank / name, tank_columns() | {"WP fwd [mm]": 0.0})
     with data_error("run 'first', channel 'eta_fwd': the record of 20"):
         campaign.encounter_period()
     # A constant channel is kept all the same: whether it serves is the model's business.
@@ -309,7 +298,9 @@ def test_a_campaign_at_fault(changed, old, new, message):
 
 
 def test_a_gap_is_cut_off(tank, changed):
-    rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
+    columns = tank_columns(1)
+    columns["Heave [mm]"][20:30] = np.nan
+    write_csv(tank / "second.csv", columns)
     run = changed(("span = [2, 18]", "record = [1, inf]")).prepare()["second"]
     assert run["time"][0] == 1.0
 
@@ -398,14 +389,10 @@ def test_a_file_that_was_cut_off_is_made_anew(campaign):
 
 def test_a_span_to_the_end_of_the_record(tank, first):
     """60 s at 50 Hz end at 59.98 s: the last sample stands for its own step."""
-    columns = {name: x[:-1] for name, x in tank_columns(0).items()}
-    write_csv(tank / "first.csv", columns)
+    write_csv(tank / "first.csv", {name: x[:-1] for name, x in tank_columns(0).items()})
     for rate in ("10", "50", "200"):
-        pairs = [
-            ("test = [10, inf]", "test = [10, 20]"),
-            ("sampling_rate = 10", f"sampling_rate = {rate}"),
-        ]
-        run = first(*pairs)
+        chain = "sampling_rate = 10", f"sampling_rate = {rate}"
+        run = first(("test = [10, inf]", "test = [10, 20]"), chain)
         assert run.attrs["test_span"][1] == pytest.approx(float(run["time"][-1]))
     with request_error(r"first\.test: received \[10, 20\.1\] s, and"):
         first(("test = [10, inf]", "test = [10, 20.1]"))

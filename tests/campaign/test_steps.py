@@ -104,8 +104,6 @@ def test_motions_are_transferred_to_another_point(tmp_path):
             # Eighth-order differences of differences leave 1e-7 of accelerations of 1 m/s².
             assert_allclose(found, rate(bow, order)(T)[:, axis], atol=1e-6)
             assert "m from where it was measured" in found.attrs["derived_from"]
-    # The transfer is no trifle: without it heave of the bow would be off by its own size.
-    assert abs(run["bow_heave"] - run["heave"]).max() > 0.1
 
 
 def test_an_integral_is_right_beside_a_gap(tmp_path):
@@ -151,8 +149,6 @@ def test_gravity_is_removed_from_accelerometers(tmp_path, zeroed):
         found = run[f"{name}_acceleration"]
         assert_allclose(found, acceleration[:, i], atol=1e-6)
         assert found.attrs["derived_from"] == f"a_{'xyz'[i]}, gravity removed by roll, pitch, yaw"
-    # What gravity adds along the deck, g sin(pitch), is larger than the motion itself.
-    assert abs(run["surge_acceleration"] - run["a_x"]).max() > 1.0
 
 
 @pytest.mark.parametrize("axis", ["x", "z"])
@@ -164,8 +160,7 @@ def test_gravity_is_removed_from_one_accelerometer(tmp_path, axis):
     columns, text = gyroscope()
     columns["a [m/s^2]"] = along + G * turn[:, 2, i]
     text += f"[channels.a]\n[derived.free]\nfrom = 'a'\nstep = 'remove_gravity'\naxis = '{axis}'\n"
-    run = prepared(tmp_path, columns, text)
-    assert_allclose(run["free"], along, atol=1e-9)
+    assert_allclose(prepared(tmp_path, columns, text)["free"], along, atol=1e-9)
 
 
 @pytest.mark.parametrize("outliers", ["replace", "flag"])
@@ -233,8 +228,7 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     assert run.attrs["celerity"] == pytest.approx(2.0, rel=1e-3)
     assert run.attrs["celerity_correlation"] == pytest.approx(1.0, abs=1e-3)
     # The start-up is used by none: what lies before the spans decides nothing.
-    spans = "train = [61, 90]\ntest = [90, 119]"
-    run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0", spans)
+    run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0", "train = [61, 90]\ntest = [90, 119]")
     assert run.attrs["celerity"] == pytest.approx(2.0, rel=1e-3)
     assert "celerity" not in two_probes(tmp_path, "eta_a = 4.0\neta_b = 4.0").attrs
 
@@ -310,8 +304,7 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
     campaign = read_campaign(path)
     clock = campaign.clocks()["r"]["camera"]
     # Noise of 1 % of the motion on 5 700 frames; two signals that differ leave windows apart.
-    within = 3e-4 if way == "shared" else 3e-3
-    assert clock.offset == pytest.approx(offset, abs=within)
+    assert clock.offset == pytest.approx(offset, abs=3e-4 if way == "shared" else 3e-3)
     assert abs(clock.drift - drift) < (4e-6 if way == "shared" else 3e-5)
     assert abs(clock.offset - offset) < 5 * clock.offset_error
     assert abs(clock.drift - drift) < 5 * clock.drift_error

@@ -19,8 +19,7 @@ RNG = np.random.default_rng
 @pytest.fixture(scope="module")
 def run():
     """Heave answers the wave and, uncorrelated with it, the wave's square: half of its SD."""
-    rng = RNG(0)
-    wave = autoregressive(rng.standard_normal(12000), 0.5)
+    wave = autoregressive(RNG(0).standard_normal(12000), 0.5)
     wave /= wave.std()
     linear = signal.lfilter([0.0, 1.0, 0.6], [1.0], wave)
     square = np.roll(wave**2 - 1, 1)
@@ -38,8 +37,8 @@ def fitted(run, observables=(), ridge=1e-6):
 
 
 def test_a_state_too_slow_for_the_segments_is_not_judged(run):
-    slow = np.sin(0.1 * run.time) + 0.01 * run.heave
-    both = run.assign(surge=slow.assign_attrs(units="m"))
+    both = run.assign(surge=0.01 * run.heave + np.sin(0.1 * run.time))
+    both.surge.attrs["units"] = "m"
     model = HankelDMDc(0, 3, 1e-3).fit(both.isel(time=slice(0, 4000)), ["surge"], ["eta"])
     found = check.coherence(model, {"run": both})
     assert found.period[0] == pytest.approx(62.8, rel=0.05)  # a segment has 16 s
@@ -75,9 +74,8 @@ def light_run(seed, noise=0.01):
     rng = RNG(seed)
     wave = signal.lfilter([1.0], [1.0, -1.6, 0.9], rng.standard_normal(6000))
     answer = signal.lfilter([0.0, 0.0, 0.0, 1.0], [1.0, -1.7, 0.98], wave)
-    heave = answer / 160 + noise * rng.standard_normal(6000)
     attrs = {"encounter_period": 1.0, "waves": "irregular", "test_span": (0.0, 1e4)}
-    return record(0.1, attrs, eta=wave, heave=heave)
+    return record(0.1, attrs, eta=wave, heave=answer / 160 + noise * rng.standard_normal(6000))
 
 
 def test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel():

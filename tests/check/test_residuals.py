@@ -17,9 +17,8 @@ def run():
     rng = default_rng(0)
     wave = autoregressive(rng.standard_normal(3000), 0.8)
     driven = 0.5 * np.roll(wave, 1) + 0.3 * np.roll(wave, 2) + 0.2 * rng.standard_normal(3000)
-    heave = autoregressive(driven, 0.6)
     attrs = {"encounter_period": 2.0, "test_span": (150.0, 299.9)}
-    return record(0.1, attrs, eta=wave, heave=heave)
+    return record(0.1, attrs, eta=wave, heave=autoregressive(driven, 0.6))
 
 
 def fitted(run, input_delays):
@@ -38,9 +37,8 @@ def test_a_right_model_leaves_white_errors(run):
 
 def test_bands_and_ages_add_up(run):
     found = check.residuals(fitted(run, 1), {"run": run})
-    squares = (found.band_nrmse**2).sum("band")
     whole = found.error_spectrum.sum("frequency") / found.measured_spectrum.sum("frequency")
-    assert squares.values == pytest.approx(whole.values)
+    assert (found.band_nrmse**2).sum("band").values == pytest.approx(whole.values)
     assert found.age_nrmse[0, 0] == pytest.approx(float(found.one_step[0]), rel=0.3)
     assert found.age_nrmse[0, -1] < 1
 

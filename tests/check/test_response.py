@@ -5,7 +5,7 @@ from math import tau
 
 import numpy as np
 import pytest
-from drifting import FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES, drifting_run
+from drifting import DEPTH, DT, FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES, drifting_run
 from moored import moored_run
 from numpy.random import default_rng
 from records import record, rms
@@ -16,7 +16,6 @@ from seakeep.check.parts import reference_probe
 from seakeep.core.spectra import estimate, harmonic_fits
 from seakeep.waves import wavenumber
 
-DT, DEPTH, PLACES = 0.1, 3.6, {"eta_fwd": -1.5, "eta_cog": 0.0}
 FREQUENCIES = np.array([0.3, 0.5, 0.8])
 
 
@@ -30,24 +29,23 @@ def phasors(found):
     return found.amplitude.values * np.exp(1j * np.radians(found.phase.values))
 
 
-def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, **attrs):
-    """Waves past two probes, and a heave that answers them by :func:`answer`."""
+def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, surge=0.0, **attrs):
+    """Waves past two probes, and a heave that answers them by :func:`answer` where it is."""
     rng, f = default_rng(seed), np.asarray(frequencies)
     waves = Sea(f, 0.02 * np.ones(f.size), rng.uniform(0, tau, f.size), DEPTH)
     time, of = DT * np.arange(samples), answer(f)
     answered = replace(waves, amplitude=0.02 * abs(of), phase=waves.phase + np.angle(of))
     attrs = {"water_depth": DEPTH, "encounter_period": 1.6, **attrs}
-    heave = answered.at(time) + noise * rng.standard_normal(samples)
-    run = record(DT, attrs, **{n: waves.at(time, x) for n, x in PLACES.items()}, heave=heave)
-    for name, x in PLACES.items():
+    heave = answered.at(time, POSITIONS["eta_cog"] + surge) + noise * rng.standard_normal(samples)
+    run = record(DT, attrs, **{n: waves.at(time, x) for n, x in POSITIONS.items()}, heave=heave)
+    for name, x in POSITIONS.items():
         run[name].attrs["x_position"] = x
     return run
 
 
 @pytest.fixture(scope="module")
 def sea():
-    rng = default_rng(3)
-    return vessel_run(rng.uniform(0.3, 0.9, 60), run="sea", waves="irregular")
+    return vessel_run(default_rng(3).uniform(0.3, 0.9, 60), run="sea", waves="irregular")
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +83,7 @@ def test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectru
     rng = default_rng(8)
     inside = []
     for seed in range(5):
-        waves = 0.3 + 0.6 * rng.beta(2.0, 3.0, 300)
-        run = vessel_run(waves, seed, noise=0.01, waves="irregular")
+        run = vessel_run(0.3 + 0.6 * rng.beta(2.0, 3.0, 300), seed, noise=0.01, waves="irregular")
         at = check.measured_response(model, {"run": run}).isel(state=0)
         error = np.abs(phasors(at) - answer(at.frequency.values))
         inside.append(error < at.amplitude_uncertainty.values)
@@ -105,16 +102,10 @@ def test_a_rate_of_an_elevation_is_no_reference(sea):
 def test_measured_phases_count_from_the_waves_where_the_vessel_is():
     spec = HankelDMDc(2, 4, 0.1, alignment=FOLLOWED, delay_rows="exact")
     model = spec.fit(drifting_run(), STATES, INPUTS)
-    time, rng = DT * np.arange(1200), default_rng(0)
-    wave = Sea(np.array([0.7]), np.array([0.02]), np.array([1.0]), DEPTH)
-    vessel = POSITIONS["eta_cog"] + 0.6  # m: half a wave of 3.2 m is 1.6
-    channels = {name: wave.at(time, x) for name, x in POSITIONS.items()}
-    heave = 0.8 * wave.at(time - 0.2, vessel) + 0.4 * wave.at(time - 0.5, vessel)
-    surge = 0.6 + 1e-4 * rng.standard_normal(time.size)
-    drifted = record(DT, {"waves": "regular", "water_depth": DEPTH, "encounter_period": 1.4},
-                     surge=surge, heave=heave, **channels)  # fmt: skip
-    for name, x in POSITIONS.items():
-        drifted[name].attrs["x_position"] = x
+    away = 0.6  # m: half a wave of 3.2 m is 1.6
+    drifted = vessel_run([0.7], samples=1200, surge=away, waves="regular", encounter_period=1.4)
+    surge = away + 1e-4 * default_rng(0).standard_normal(1200)
+    drifted["surge"] = "time", surge, {"units": "m"}
     runs = {"regular": drifted, "sea": drifting_run(1, 6000).assign_attrs(waves="irregular")}
     found = check.measured_response(model, runs).sel(state="heave")
     error = np.abs(phasors(found) - answer(found.frequency.values))
@@ -180,7 +171,6 @@ def test_intervals_of_a_harmonic_fit_cover_as_they_say():
 
 
 def test_type_a_uncertainty_is_that_of_the_mean_of_few_windows():
-    ratios = np.array([1.0, 1.2, 1.1])[:, None].astype(complex)
-    found = estimate(ratios, np.zeros(1))
+    found = estimate(np.array([1.0, 1.2, 1.1])[:, None].astype(complex), np.zeros(1))
     # Student's t of two degrees of freedom times 0.1/√3.
     assert found.amplitude[0] == pytest.approx(4.302653 * 0.1 / np.sqrt(3), rel=1e-6)

@@ -34,8 +34,7 @@ def runs():
 
 @pytest.fixture(scope="module")
 def model(runs):
-    spec = HankelDMDc(2, 4, 1e-6, delay_rows="exact")
-    return spec.fit({"train": runs["train"]}, STATES, ["eta"])
+    return HankelDMDc(2, 4, 1e-6, delay_rows="exact").fit({"train": runs["train"]}, STATES, ["eta"])
 
 
 @pytest.fixture(scope="module")
@@ -80,8 +79,7 @@ def test_training_is_judged_apart(model, runs, checked):
     assert found["training_residuals"].attrs["of"] == "training"
     alone = check_model(model, {"train": runs["train"]})
     assert "training_residuals" not in alone.results
-    points = check_sections(alone)[0].points
-    assert points[0].startswith("No run tests the model.")
+    assert check_sections(alone)[0].points[0].startswith("No run tests the model.")
 
 
 def worded(found, **more):

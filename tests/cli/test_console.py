@@ -27,8 +27,7 @@ def test_a_bar_shows_counts_and_time_whole_and_notes_stand_on_lines_of_their_own
     terminal = {"TERM": "xterm-256color", "FORCE_COLOR": "1", "COLUMNS": str(columns)}
     work = [sys.executable, "-W", "default", "-c", WORK]
     done = subprocess.run(work, capture_output=True, check=True, env=os.environ | terminal)
-    written = done.stderr.decode()
-    plain = re.sub(r"\x1b\[[0-9;?]*m", "", written)
+    plain = re.sub(r"\x1b\[[0-9;?]*m", "", done.stderr.decode())
     frames = [part for part in re.split(r"\r?\x1b\[2K|\r?\n", plain) if "/1234" in part]
     assert frames
     for frame in frames:

@@ -84,8 +84,9 @@ def test_a_model_in_service_and_its_example_that_plays_a_run(tutorial, capsys):
     )
 
 
-@pytest.mark.usefixtures("empty_sheet")
+@pytest.mark.usefixtures("empty_figures")
 def test_the_measurement_chain(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
     pytest.importorskip("numba")
     monkeypatch.chdir(tmp_path)
     play(page("measurement_chain.md"))

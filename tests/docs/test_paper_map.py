@@ -29,13 +29,11 @@ def test_functions_and_tests_exist(row):
     assert quoted(tests), "the row names no test"
     for name in quoted(tests):
         file, test = name.split("::")
-        text = (ROOT / file).read_text("utf-8")
-        assert f"def {test}(" in text, f"{file} has no {test}"
+        assert f"def {test}(" in (ROOT / file).read_text("utf-8"), f"{file} has no {test}"
 
 
 def test_every_deviation_is_there_once():
-    numbers = [int(line.split("|")[1]) for line in DEVIATIONS]
-    assert numbers == list(range(1, 32))
+    assert [int(line.split("|")[1]) for line in DEVIATIONS] == list(range(1, 32))
 
 
 @pytest.mark.parametrize("line", DEVIATIONS, ids=lambda line: line.split("|")[1].strip())

@@ -46,9 +46,8 @@ def test_what_alignment_brings():
     paper, ours = (
         rows(part, "alignment") for part in results("alignment_on_tank").split("## Preset")[1:]
     )
-    quoted = rows(TANK, "alignment")
     for (mode, row), name in zip(
-        quoted.items(),
+        rows(TANK, "alignment").items(),
         ("measured, dispersion ¹", "measured, effective ¹", "predicted, dispersion", "none"),
         strict=True,
     ):

@@ -48,7 +48,6 @@ def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():
     model = PLAN.fit({str(seed): drifting(seed) for seed in (1, 2)})
     away = {}
     for plans in (False, True):
-        surge = PLAN.play(model, drifting(3), plans) - model.state_scale.centre[0]
-        away[plans] = rms(surge)
+        away[plans] = rms(PLAN.play(model, drifting(3), plans) - model.state_scale.centre[0])
     # A plan of another sign or another instant pushes it away.
     assert away[True] < 0.7 * away[False]

@@ -72,16 +72,14 @@ def test_sway_needs_the_tilt_and_the_arm_with_their_signs(section_runs):
     for name in ("3102_1", "3102_2", "3102_3", "3102_4"):
         run = section_runs[name]
         springs = run["spring_offset_in_band"].std()
-        ratio = float(run["sway"].std() / springs)
-        assert 0.8 <= ratio <= 1.2
+        assert 0.8 <= float(run["sway"].std() / springs) <= 1.2
         wrong = run["acc_sway"] + 9.81 * run["roll"] - 0.0502 * run["roll_acceleration"]
         integrated = seakeep.signals.integrate(wrong, run.attrs["dt"], (0.4, 5.0), times=2)
         assert integrated.std() / springs > 2.0
 
 
 def test_sway_is_forecast_where_its_target_is_sound(section):
-    model = fit_campaign(section, "sway")
-    table = comparison_table(compare(model, section))
+    table = comparison_table(compare(fit_campaign(section, "sway"), section))
     # Asked for: 0.17 for 3102_3 (found 0.044). The other two stand near the resonance of roll,
     # where the tilt's part is ten times the sway; they are reported, not judged.
     assert table["nrmse"].sel(run="3102_3", channel="sway") <= 0.08
@@ -139,8 +137,7 @@ def test_a_constant_time_lag_stands_beside_the_offset(semisubmersible):
     # One celerity makes of a distance one lag for all frequencies; which one does not matter.
     celerity = 25.0
     one = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=celerity)
-    spec = replace(model.settings, alignment=one)
-    lagging = spec.fit(train, model.states, model.inputs)
+    lagging = replace(model.settings, alignment=one).fit(train, model.states, model.inputs)
     found = seakeep.estimate_probe_offset(lagging, run, SPAN)
     assert found.offset / celerity == pytest.approx(1.31, abs=0.10)  # s; twice its spread of 0.05
     assert 0.02 < found.spread / celerity < 0.12

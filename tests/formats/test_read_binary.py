@@ -32,15 +32,16 @@ NAMES = np.array(["time", "heave", "wave"], dtype=object)
 UNITS = np.array(["s", "mm", "m"], dtype=object)
 MATRIX = np.column_stack([T, HEAVE, WAVE])
 BOTH = {"heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}}
+SOUND = {"time": T, **BOTH}
 UNTIMED = {"data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]}
 
 
 @pytest.mark.parametrize(
     "content",
     [
-        {"time": T, **BOTH, "units": {"heave": "mm", "wave": "m"}},
-        {"time": T[:, None], **BOTH, "heave": HEAVE[None, :]},
-        {"run": {"time": T, **BOTH}},
+        {**SOUND, "units": {"heave": "mm", "wave": "m"}},
+        {**SOUND, "time": T[:, None], "heave": HEAVE[None, :]},
+        {"run": SOUND},
         {"data": MATRIX, "names": NAMES, "units": UNITS},
         {"run": {"data": MATRIX, "channels": NAMES, "units": UNITS}},
         {"time": T, **UNTIMED},
@@ -61,9 +62,7 @@ def test_matlab(tmp_path, content, save):
     check(run.assign_coords(time=T))
 
 
-SOUND = {"time": T, **BOTH}
 GAINS = {"gains": np.ones(7)}
-LIST = {"units": np.array(["s", "mm", "m"], dtype=object)}
 
 
 @pytest.mark.parametrize(
@@ -77,7 +76,11 @@ LIST = {"units": np.array(["s", "mm", "m"], dtype=object)}
         ({"t_DAQ": T, "early": T[1:], **BOTH}, "early", "has 199 values, and most 200"),
         ({**SOUND, "loads": {"bow": T}}, "loads", "'loads' is a struct beside other channels. Sa"),
         ({"run": SOUND, "about": {"gains": np.ones(7)}}, "about", "'about' is a struct beside"),
-        ({**SOUND, **LIST}, "units", "'units' lists 3 units, and no list says of which columns"),
+        (
+            {**SOUND, "units": UNITS},
+            "units",
+            "'units' lists 3 units, and no list says of which columns",
+        ),
         ({"run": SOUND, "about": {"date": "1 May"}}, None, ""),
     ],
 )

@@ -70,16 +70,19 @@ def test_dialects(read, text):
     run = read(text)
     assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
     assert run["Heave"].dims == ("time",)
-    values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
-    for name, expected in (values | {"WP 1": [3, 4, 5]}).items():
+    for name, expected in {
+        "time": [0.0, 0.1, 0.2],
+        "Heave": [1.5, -1.5, 0.5],
+        "Pitch": [2, 2e-3, 2],
+        "WP 1": [3, 4, 5],
+    }.items():
         assert_array_equal(run[name], expected)
     units = [each.attrs.get("units") for each in run.values()]
     assert units == ["mm", "deg", "-" if ",-\n" in text or "\t-\n" in text else None]
 
 
 def test_blanks(read):
-    text = "  Time [s]   Heave [mm]  Pitch\n  0.0   1.5  -2\n 0.1  1  2\n"
-    run = read(text, "run.txt")
+    run = read("  Time [s]   Heave [mm]  Pitch\n  0.0   1.5  -2\n 0.1  1  2\n", "run.txt")
     assert list(run.data_vars) == ["Heave", "Pitch"]
     assert run["Heave"].attrs["units"] == "mm"
     assert_array_equal(run["Pitch"], [-2, 2])
@@ -89,16 +92,14 @@ def test_blanks(read):
 @pytest.mark.parametrize("mark", [" ", "\t"])
 def test_words_stand_above_the_header(read, mark, words):
     table = "Time Heave Pitch WP\n(s) (mm) (kN-m) (-)\n0 1.5 -2 3\n0.1 1 2 4\n"
-    text = f"Made by a program, on a day: no 7\n{words}{table.replace(' ', mark)}"
-    run = read(text, "run.out")
+    run = read(f"Made by a program, on a day: no 7\n{words}{table.replace(' ', mark)}", "run.out")
     units = {str(name): each.attrs.get("units") for name, each in run.items()}
     assert units == {"Heave": "mm", "Pitch": "kN-m", "WP": "-"}
     assert_array_equal(run["Pitch"], [-2, 2])
 
 
 def test_words_stand_above_a_header_that_holds_another_mark(read):
-    text = "Made by a program\n\nTime Heave WP,1\n0 1.5 3\n0.1 1 4\n"
-    run = read(text, delimiter=" ")
+    run = read("Made by a program\n\nTime Heave WP,1\n0 1.5 3\n0.1 1 4\n", delimiter=" ")
     assert list(run.data_vars) == ["Heave", "WP,1"]
 
 
@@ -106,9 +107,8 @@ def test_words_stand_above_a_header_that_holds_another_mark(read):
 @pytest.mark.parametrize("apart", ["\n", "# remark\n"])
 @pytest.mark.parametrize("bad", ["0.00,OVR,1.0", "nan,OVR,nan", "(sec),(mtr),(mtr)"])
 def test_a_header_stands_apart_from_a_row_that_is_no_header(tmp_path, units, apart, bad):
-    text = f"time,WP fwd,heave\n{units}{apart}{bad}\n0.05,0.1,1.1\n0.10,0.2,1.2\n"
     path = tmp_path / "run.csv"
-    path.write_text(text)
+    path.write_text(f"time,WP fwd,heave\n{units}{apart}{bad}\n0.05,0.1,1.1\n0.10,0.2,1.2\n")
     columns = read_columns(path)
     assert list(columns.headers) == ["time", "WP fwd", "heave"]
     line = 4 if units else 3
@@ -132,8 +132,7 @@ def test_options(read):
 @pytest.mark.parametrize("stated", [None, "stated"])
 def test_time_in_the_unit_that_its_name_ends_on(read, name, stated):
     text = f"{name};heave\n0;1\n20;2\n"
-    run = read(text, time=stated and name)
-    assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
+    assert_allclose(read(text, time=stated and name)["time"], [0, 0.02], rtol=1e-15)
     slow = read(text, time=name, time_unit="s")  # a name is no header
     assert_array_equal(slow["time"], [0, 20])
 

@@ -42,8 +42,7 @@ def drifting_run(seed=0, samples=1500, moved=0.0):
         **{key: waves.at(time, x + moved) for key, x in POSITIONS.items()},
         "mooring_bow": load + LOAD_NOISE * rng.standard_normal(samples),
     }
-    attrs = {"water_depth": DEPTH, "run": "run", "encounter_period": 1.5}
-    run = record(DT, attrs, **channels)
+    run = record(DT, {"water_depth": DEPTH, "run": "run", "encounter_period": 1.5}, **channels)
     for key, x in POSITIONS.items():
         run[key].attrs["x_position"] = x
     return run

@@ -12,8 +12,7 @@ def wave_run(seed=0, samples=900, name="irregular", noise=0.02):
     """Of 0.1 s: a linear response to a narrow-banded input, with noise that no member knows of."""
     rng = np.random.default_rng(seed)
     frequencies = rng.uniform(0.3, 1.0, 40)
-    phases = rng.uniform(0, 2 * np.pi, 40)
-    angles = 0.2 * np.pi * np.outer(np.arange(samples), frequencies) + phases
+    angles = 0.2 * np.pi * np.outer(np.arange(samples), frequencies) + rng.uniform(0, 2 * np.pi, 40)
     gain = 1 / (1 + (frequencies / 0.6) ** 4)
     series = {
         "heave": np.cos(angles - 0.4) @ gain,

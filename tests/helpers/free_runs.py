@@ -22,6 +22,5 @@ def held_out_scores(spec, runs, states, inputs, steps, first, groups=None):
     found = []
     for name, run in runs.items():
         others = [runs[key] for key in runs if groups[key] != groups[name]]
-        model = spec.fit(others, states, inputs)
-        found.append(loop_score(model, run, states, steps, first))
+        found.append(loop_score(spec.fit(others, states, inputs), run, states, steps, first))
     return found

@@ -11,8 +11,7 @@ import threadpoolctl
 
 def blas_threads(data, item):
     np.linalg.norm(scipy.linalg.cholesky(np.eye(3)))  # both libraries are loaded and used
-    found = [each["num_threads"] for each in threadpoolctl.threadpool_info()]
-    return os.getpid(), found
+    return os.getpid(), [each["num_threads"] for each in threadpoolctl.threadpool_info()]
 
 
 def square(data, item):

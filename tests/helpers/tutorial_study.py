@@ -96,11 +96,9 @@ def assert_cells_are_what_the_models_say(found, plan, **near):
                     ours = cell.sel(channel=channel)
                     spread = part[channel].values.std(ddof=1)
                     assert_allclose(ours["training_std"], spread, rtol=1e-9)
-                    mean = ours["mean"].sel(model="deterministic")
-                    assert_allclose(mean, alone[channel], **near)
+                    assert_allclose(ours["mean"].sel(model="deterministic"), alone[channel], **near)
                     ours = ours.sel(model="bayesian", ensemble="bayesian")
                     for key in ("mean", "std", "lower", "upper"):
-                        expected = band[channel].sel(statistic=key)
-                        assert_allclose(ours[key], expected, **near)
+                        assert_allclose(ours[key], band[channel].sel(statistic=key), **near)
                     measured = run[channel].values[at : at + window.steps]
                     assert_array_equal(ours["measured"], measured)

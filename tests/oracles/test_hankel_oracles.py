@@ -89,8 +89,7 @@ def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     x = np.cumsum(rng.standard_normal((z + m, n)), axis=0)
     u = rng.standard_normal((z + m, q))
     states, inputs = [f"x{i}" for i in range(n)], [f"u{i}" for i in range(q)]
-    columns = zip(states + inputs, np.hstack([x, u]).T, strict=True)
-    run = record(0.05125, **dict(columns))
+    run = record(0.05125, **dict(zip(states + inputs, np.hstack([x, u]).T, strict=True)))
 
     def extended(series, delays, first):
         """Columns j = `first` … of deviations, m − 1 of them (equations of HDMDc)."""

@@ -76,8 +76,7 @@ def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
     slow = xr.Dataset({key: ("mode", [1.0]) for key in keys})
     slow["participation"] = (("mode", "state"), [[1.0]])
     slow = slow.assign_coords(state=["pitch"])
-    decay = check_sections(Checked({"decay": found, "modes": slow}, {}, {}))[3]
-    (only,) = decay.points
+    (only,) = check_sections(Checked({"decay": found, "modes": slow}, {}, {}))[3].points
     assert only.startswith("pitch: after its release the model swings to 3 times the offset")
 
 
@@ -96,8 +95,7 @@ def test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told():
     run, inputs = moored_run(2), ["eta", "mooring_bow"]
     model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], inputs)
     checked = check_model(model, {"run": run})
-    response = check_sections(checked)[1]
-    assert "inputs (mooring_bow) are at their means" in " ".join(response.words)
+    assert "inputs (mooring_bow) are at their means" in " ".join(check_sections(checked)[1].words)
     found = checked.results["statistics"]
     sides = ["extreme_chance", "trough_chance"]
     for side in sides:

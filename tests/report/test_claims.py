@@ -91,8 +91,7 @@ def test_loads_diverge_more_by_the_ends_of_both_intervals(lower, expected):
 
 def test_the_slow_part_of_loads_is_judged_without_the_waves():
     fast, slow = np.sin(tau * TIME), np.sin(tau * TIME / 12)
-    measured = np.broadcast_to((slow + 0.3 * fast)[:, None], SHAPE)
-    test = windows({}, measured)
+    test = windows({}, np.broadcast_to((slow + 0.3 * fast)[:, None], SHAPE))
     for part, expected in ((slow - fast, True), (0.3 * fast - slow, False)):
         test["mean"] = test["mean"].dims, np.broadcast_to(part[:, None], test["mean"].shape)
         assert holds("slow_loads", study(irregular=test)) is expected

@@ -59,8 +59,7 @@ def ensemble(slack=False):
     band = band.assign_coords(statistic=["lower", "upper"])
     # A sinusoid beside the mean: it leaves the band where its modulus is above 0.2.
     heave = (mean["heave"] + 0.4 * np.sin(7 * TIME)).assign_attrs(mean["heave"].attrs)
-    measured = single.measured.assign(heave=heave)
-    return Comparison("r1", "calm", mean, measured, single.inputs, band)
+    return Comparison("r1", "calm", mean, single.measured.assign(heave=heave), single.inputs, band)
 
 
 def row_of(compared):
@@ -123,8 +122,7 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
 def waves_of(period, factor, run):
     """A comparison in regular waves."""
     wave = {"eta_fwd": ("time", np.sin(2 * np.pi * TIME / period), {"units": "m"})}
-    inputs = xr.Dataset(wave, coords={"time": TIME})
-    return replace(comparison(factor), run=run, inputs=inputs)
+    return replace(comparison(factor), run=run, inputs=xr.Dataset(wave, coords={"time": TIME}))
 
 
 def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
@@ -229,8 +227,7 @@ def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):
     ]  # fmt: skip
     check_output(path, "forecast", header=forecast_header(["heave"]))  # may be replaced
     forecast.attrs["reads_input_until"] = -0.1  # a model without a look-ahead
-    text = write_forecast(forecast, path).read_text()
-    assert text.splitlines()[0] == "time [s],heave []"
+    assert write_forecast(forecast, path).read_text().splitlines()[0] == "time [s],heave []"
 
 
 def overlay_figure(compared):

@@ -79,8 +79,7 @@ def test_the_page_holds_its_parts_and_names_nothing_outside_itself(page, result)
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
     wanted = ["summary", "errors", "explore", "densities", "settings", "versions", "words"]
-    found = re.findall(r'<section id="(.*?)">', text)
-    assert [each for each in found if each in wanted] == wanted
+    assert [each for each in re.findall(r'<section id="(.*?)">', text) if each in wanted] == wanted
     for part in ("a &amp; b &lt; c", "noise floor", result.attrs["digest"], "<dt>EV, U</dt>"):
         assert part in text
     assert "θ pitch; z\u0307 heave rate" in text
@@ -159,8 +158,7 @@ def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(resul
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-4:] == ("paper: EV", "paper: q0.025", "paper: q0.975", "paper: U")
     published = WORDS["published"]
-    rows = [row[-4:] for row in table.rows if row[0] == "heave"]
-    assert rows == [tuple(published["heave"])]
+    assert [row[-4:] for row in table.rows if row[0] == "heave"] == [tuple(published["heave"])]
 
 
 def test_a_report_that_was_interrupted_is_written_again(tmp_path):

@@ -81,13 +81,11 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
         period=6.0, motion=0.7, step=np.nan, lag=0.015, lag_spread=0.005, growth=0.0,
         correlation=1.0, nrmse=0.0, gain=1.0, centre=centre, lags=lags,
     )  # fmt: skip
-    figure = quality_figure(run, {"heave": found})
-    top, pitch, lag = figure.axes
+    top, pitch, lag = quality_figure(run, {"heave": found}).axes
     assert pitch.get_ylabel().endswith("[deg]")
     assert top.get_facecolor() != pitch.get_facecolor()  # it has a finding
     marks = next(line for line in top.lines if line.get_label() == "missing").get_ydata()
-    true = np.interp(time[40:45], time[[39, 45]], heave[[39, 45]])
-    np.testing.assert_allclose(marks, true)
+    np.testing.assert_allclose(marks, np.interp(time[40:45], time[[39, 45]], heave[[39, 45]]))
     line = lag.lines[0]
     assert list(np.isnan(line.get_ydata())) == [False, False, True, False, False]
     # The scale follows the harmful lag, a thirtieth of a period, and not the lags searched, a half.

@@ -47,8 +47,7 @@ def result():
         "statistics/boxes": box_table(test).expand_dims(test=["t"]),
         "statistics/bands": band_tables(test, None, 0.95)["bands"].expand_dims(test=["t"]),
     }  # fmt: skip
-    attrs = {"settings": json.dumps(settings), "models": models_of(m={})}
-    return StudyResult(None, attrs, groups)
+    return StudyResult(None, {"settings": json.dumps(settings), "models": models_of(m={})}, groups)
 
 
 def models_of(**models):
@@ -101,11 +100,10 @@ def test_models_that_read_the_measured_surge_are_named_where_they_are_shown(resu
         "alignment.surge": {"value": "measured"},
         "alignment.surge_channel": {"value": "x_0"},
     }
-    causal = {**reading, "alignment.surge": {"value": "predicted"}}
     found = with_models(
         result,
         paper={"settings": reading},
-        m={"settings": causal},
+        m={"settings": {**reading, "alignment.surge": {"value": "predicted"}}},
         own={},
         hold_last={"role": "reference"},
     )

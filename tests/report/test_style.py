@@ -24,8 +24,7 @@ def drawing():
 def test_a_picture_is_the_figure(tmp_path):
     found = Image.open(save_figure(drawing(), tmp_path / "ours.png")).convert("RGB")
     with figure_style():
-        figure = drawing()
-        figure.savefig(tmp_path / "theirs.png")
+        drawing().savefig(tmp_path / "theirs.png")
     expected = Image.open(tmp_path / "theirs.png").convert("RGB")
     assert found.size == expected.size
     difference = np.asarray(found, float) - np.asarray(expected, float)

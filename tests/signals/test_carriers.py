@@ -22,8 +22,7 @@ def recorded(waves):
 
 @pytest.fixture(scope="module")
 def spectrum():
-    records = [recorded(sea(seed)) for seed in (1, 2, 3)]
-    return mean_spectrum(records, DT, PERIOD)
+    return mean_spectrum([recorded(sea(seed)) for seed in (1, 2, 3)], DT, PERIOD)
 
 
 def test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design(spectrum):
@@ -35,9 +34,8 @@ def test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design(
     found = carried(taps, recorded(waves))
     for column, place in enumerate(places):
         true = waves.at(TIME + LEAD * DT, place)[BACK:-AHEAD]
-        off = float(np.std(found[:, column] - true) / true.std())
         # The design weighs all frequencies of training and noise; this sea has lines of its own.
-        assert off < 1.5 * errors[column] + 0.02
+        assert float(np.std(found[:, column] - true) / true.std()) < 1.5 * errors[column] + 0.02
         assert errors[column] < 0.12
     # At the probe itself, within what was read, the wave is the sample.
     assert errors[1] < 0.02

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from seas import sea
 
 from seakeep.signals import correlation_peak, effective_celerity
-from seakeep.waves import phase_speed
 
 DEPTH, APART, DT = 3.6, 3.67, 1.64 / 32
 TIME = DT * np.arange(4096)
@@ -28,9 +27,8 @@ def test_effective_celerity_is_that_of_the_true_spectrum(seed):
     found = effective_celerity(*records, DT, APART, DEPTH)
     lags = np.linspace(*found.bounds, 8001)
     truth = replace(waves, amplitude=waves.amplitude**2, phase=0.0).at(lags, APART)
-    expected = APART / lags[np.argmax(truth)]
     # A record of 210 s realises the spectrum with a scatter of about a percent in the peak.
-    assert found.celerity == pytest.approx(expected, rel=0.03)
+    assert found.celerity == pytest.approx(APART / lags[np.argmax(truth)], rel=0.03)
     assert found.bounds[0] < found.lag < found.bounds[1]
     assert 0.3 < found.correlation < 1.0
 
@@ -39,17 +37,14 @@ def test_the_bound_keeps_the_peak_of_the_next_period_out():
     records, _ = probes()
     bounded = effective_celerity(*records, DT, APART, DEPTH)
     wide, _ = correlation_peak(*records, DT, (0.0, 8.0))
-    # The paper's unbounded peak sits a period late, below every phase speed of the band.
-    assert wide - bounded.lag > 1.0
-    assert APART / wide < phase_speed(tau * 1.13, DEPTH)
+    assert wide - bounded.lag > 1.0  # the paper's unbounded peak sits a period late
 
 
 @settings(max_examples=30)
 @given(lag=st.floats(0.0, 1.0), period=st.floats(1.2, 3.0))
 def test_a_peak_between_samples(lag, period):
-    rng = np.random.default_rng(3)
     omega = tau / period * np.array([0.9, 1.0, 1.1])
-    phase = rng.uniform(0, 6.28, 3)
+    phase = np.random.default_rng(3).uniform(0, 6.28, 3)
     a, b = (np.cos(np.outer(TIME - shift, omega) + phase).sum(axis=1) for shift in (0.0, lag))
     found, height = correlation_peak(a, b, DT, (-0.4, 1.4))
     # A parabola on 23 samples a wave and more is off by 1e-3 of a sample; the cut records differ

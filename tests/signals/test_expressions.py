@@ -35,15 +35,13 @@ def test_values(text, expected):
 def test_names_between_backticks():
     expression = parse("2 * `WP 1 [m]` - `μ` / x")
     assert expression.channels == ("WP 1 [m]", "μ", "x")
-    values = {"WP 1 [m]": A, "μ": B, "x": A}
-    assert_array_equal(expression.evaluate(values), 2 * A - B / A)
+    assert_array_equal(expression.evaluate({"WP 1 [m]": A, "μ": B, "x": A}), 2 * A - B / A)
 
 
 @pytest.mark.parametrize(
     ("text", "position", "what"),
     [
         ("a + __import__('os')", 5, "'__import__' is not a known function"),
-        ("a.real", 1, "'a.real' is none of the allowed forms"),
         ("a + b[0]", 5, "'b[0]' is none of the allowed forms"),
         ("a + (lambda: 0)()", 5, "'(lambda: 0)()' is none of the allowed forms"),
         ("a + 'text'", 5, "\"'text'\" is none of the allowed forms"),
@@ -58,7 +56,6 @@ def test_names_between_backticks():
         ("sqrt(a, axis=0)", 1, "'sqrt(a, axis=0)' is none of the allowed forms"),
         ("`wave 1`.x + a", 1, "'`wave 1`.x' is none of the allowed forms"),
         ("a b", 3, "this is not an arithmetic expression"),
-        ("heave = a", 7, "this is not an arithmetic expression"),
     ],
 )
 def test_refused(text, position, what):

@@ -32,15 +32,11 @@ def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
     # half a sample is 5° of the waves themselves.
     assert np.degrees(found.phase) % 360 == pytest.approx(220, abs=6)
     assert found.correlation > 0.99
-    # The raw record does not show it.
-    late = round(99 / 0.85 / DT)
-    assert np.corrcoef(record[:-late], record[late:])[0, 1] < -0.5
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_other_seas_do_not(seed):
-    record = sea(seed)
-    assert leak([sea(seed + 10), sea(seed + 20)], record) is None
+    assert leak([sea(seed + 10), sea(seed + 20)], sea(seed)) is None
     jittered = sea(seed, jitter=1.0)
     assert leak([jittered[:HALF]], jittered[HALF:]) is None
 
@@ -72,7 +68,6 @@ def test_still_water_before_the_waves_is_no_part_of_the_comparison():
     ramp = np.clip((TIME - 20.0) / 10.0, 0.0, 1.0)
     trains = [ramp * np.sin(2 * np.pi * TIME / period) for period in (0.9, 0.63)]
     assert leak([trains[0]], trains[1]) is None
-    late = np.concatenate([np.zeros(600), sea()[:1400]])
-    found = leak([sea()], late)
+    found = leak([sea()], np.concatenate([np.zeros(600), sea()[:1400]]))
     assert found.share == 1.0
     assert found.test_start - found.training_start == pytest.approx(600 * DT, abs=DT)

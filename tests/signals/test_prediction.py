@@ -90,9 +90,8 @@ def test_short_gaps_are_closed_by_cubics_and_the_newest_by_what_there_is():
 
 
 def test_columns_are_continued_alone_and_a_still_one_stays():
-    rng = default_rng(2)
     both = np.stack([np.sin(0.3 * np.arange(300)), np.full(300, 0.7)], axis=1)
-    both[:, 0] += 0.1 * rng.standard_normal(300)
+    both[:, 0] += 0.1 * default_rng(2).standard_normal(300)
     found = predict_waves(both, 30)
     assert_array_equal(found[:, 0], predict_waves(both[:, 0], 30))
     assert_allclose(found[:, 1], 0.7, rtol=1e-12)
@@ -134,8 +133,7 @@ def test_departures_of_a_sea_are_the_errors_of_its_prediction():
     record = np.transpose(parts) + 0.05 * rng.standard_normal((460, trials))
     found = foresee(record[:400], 60, dt=0.1, positions=[np.nan] * trials, depth=3.6)
     own = found.departures[np.arange(trials), :, np.arange(trials)]
-    others = found.departures.sum(axis=0) - own.T
-    assert not others.any()
+    assert not (found.departures.sum(axis=0) - own.T).any()
     ratio = (record[400:] - found.expected).T / np.sqrt(np.cumsum(own**2, axis=1))
     # These seas tell the root to 2 %. Errors of 62 coefficients in 400 samples count as those of
     # one step do, to first order; without them the root is 15 % larger.

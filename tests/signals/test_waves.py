@@ -32,13 +32,11 @@ def test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not():
     assert not is_regular(wave + 0.7 * np.sin(7.0 * t))
     for seed in range(5):  # eight waves or so
         assert not is_regular(sea(seed, band=(0.38, 0.7)).at(np.arange(0, 16, 0.02)))
-    narrow = sea(0, band=(0.7, 1.3), peak=1.1)
-    assert not is_regular(narrow.at(np.arange(0, 100, 0.02)))
+    assert not is_regular(sea(0, band=(0.7, 1.3), peak=1.1).at(np.arange(0, 100, 0.02)))
 
 
 def test_the_spectrum_holds_the_variance():
-    rng = default_rng(0)
-    series = rng.standard_normal(20_000)
+    series = default_rng(0).standard_normal(20_000)
     for options in ({}, {"segment": 4096, "overlap": 128, "padded": 65536}):
         frequency, density = wave_spectrum(series, 0.05, **options)
         # White noise of unit variance, 5 to 16 segments: a per cent or two of the variance.
@@ -55,8 +53,7 @@ def test_heights_are_crest_less_trough():
 
 @given(st.floats(1.0, 4.0), st.floats(0.01, 2.0))
 def test_statistics_of_a_regular_wave(period, height):
-    t = np.arange(0, 240, 0.05)
-    found = wave_statistics(0.5 * height * np.sin(tau * t / period), 0.05)
+    found = wave_statistics(0.5 * height * np.sin(tau * np.arange(0, 240, 0.05) / period), 0.05)
     # A broken number of waves in 240 s, and for the peak a parabola within bins of 1/60 Hz.
     assert found.significant_height == pytest.approx(2**0.5 * height, rel=0.02)
     assert found.zero_crossing_period == pytest.approx(period, rel=5e-3)
@@ -71,8 +68,7 @@ T = 0.02 * np.arange(12_000)
 @given(st.integers(0, 10_000))
 def test_a_record_that_begins_and_ends_in_waves_is_counted_as_the_paper_does(seed):
     x = sea(seed).at(T[:6000])
-    counted = np.count_nonzero(np.diff(np.sign(x - x.mean())) > 0)
-    assert zero_up_crossings(x, 0.02).size == counted
+    assert zero_up_crossings(x, 0.02).size == np.count_nonzero(np.diff(np.sign(x - x.mean())) > 0)
     assert waves_part(x, 0.02) == slice(0, x.size)
 
 
@@ -91,23 +87,20 @@ def test_still_water_around_the_waves_is_not_counted(still, drift, after):
     noise[quiet : quiet + x.size] = 0.0  # what noise does among the waves is another question
     # The first waves may fall to the still part: a few of 140, and the mean moves by as little.
     assert encounter_period(whole + noise, 0.02) == pytest.approx(true, rel=0.01)
-    counted = zero_up_crossings(whole + noise, 0.02)
-    assert quiet * 0.02 - 0.1 <= counted[0] < quiet * 0.02 + 5
+    assert quiet * 0.02 - 0.1 <= zero_up_crossings(whole + noise, 0.02)[0] < quiet * 0.02 + 5
     assert wave_heights(whole + noise, 0.02).size == pytest.approx(T[-1] / true, abs=4)
 
 
 def test_noise_on_the_waves_is_not_counted_with_hysteresis():
-    rng = default_rng(0)
     x = sea(4).at(T)
-    noisy = x + 0.04 * rng.standard_normal(x.size)
+    noisy = x + 0.04 * default_rng(0).standard_normal(x.size)
     least = 0.2  # five deviations of the noise
     assert zero_up_crossings(noisy, 0.02).size > 1.2 * zero_up_crossings(x, 0.02).size
     clean = zero_up_crossings(x, 0.02, least).size
     # A wave whose crest just reaches the limit may count on one side alone.
     assert abs(zero_up_crossings(noisy, 0.02, least).size - clean) <= 2
     # Waves whose crest or trough stays below a fifth of a deviation are left out: few.
-    plain = encounter_period(x, 0.02)
-    assert encounter_period(noisy, 0.02, least) == pytest.approx(plain, rel=0.1)
+    assert encounter_period(noisy, 0.02, least) == pytest.approx(encounter_period(x, 0.02), rel=0.1)
     regular = np.sin(tau * np.arange(0, 100, 0.02) / 1.7 + 1)
     assert encounter_period(regular, 0.02, 0.3) == encounter_period(regular, 0.02)
 

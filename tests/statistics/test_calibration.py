@@ -62,8 +62,7 @@ def test_a_learnt_scale_is_the_one_that_the_errors_have():
     law = learn_scale(mean, std, y, envelope, floor)
     # 20,000 normal errors know a logarithm of their scale to 1/√40,000; the ridge takes 0.1 %.
     assert_allclose(law[1:, 0], [0.5, 0.3, 0.8], atol=0.03)
-    found = band_scale(std, floor, law, envelope)
-    assert_allclose(np.log(found / sigma), 0.0, atol=0.1)
+    assert_allclose(np.log(band_scale(std, floor, law, envelope) / sigma), 0.0, atol=0.1)
 
 
 def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
@@ -77,8 +76,7 @@ def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
 
 
 def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
-    rng = default_rng(5)
-    waves, z, steps = rng.standard_normal((2, 12, 3)), 4, 8
+    waves, z, steps = default_rng(5).standard_normal((2, 12, 3)), 4, 8
     found = wave_envelope(waves, steps)
     for step in range(steps):
         expected = np.sqrt(np.mean(waves[:, step : step + z + 1] ** 2, axis=(1, 2)))

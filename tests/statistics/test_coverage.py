@@ -15,14 +15,10 @@ from seakeep.statistics import band_crps, box_statistics, coverage, coverage_tab
 
 
 def test_each_channel_and_window_is_judged_alone():
-    rng = default_rng(1)
-    measured = rng.standard_normal((3, 50, 2))
-    lower = measured - np.array([1.0, -0.5])
-    upper = measured + np.array([2.0, 1.5])
-    found = coverage(lower, upper, measured)
-    assert found.inside.shape == (3, 2)
-    assert np.all(found.inside == [1.0, 0.0])
-    assert np.all(found.below == [0.0, 1.0])
+    measured = default_rng(1).standard_normal((3, 50, 2))
+    found = coverage(measured - np.array([1.0, -0.5]), measured + np.array([2.0, 1.5]), measured)
+    assert_array_equal(found.inside, [[1.0, 0.0]] * 3)
+    assert_array_equal(found.below, [[0.0, 1.0]] * 3)
     # Differences of sums of numbers of order one.
     assert_allclose(found.width, [[3.0, 1.0]] * 3, rtol=1e-12)
     expected = np.array([3.0, 1.0]) / measured.std(axis=1, ddof=1)
@@ -89,8 +85,7 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
         found = table.inside[row], table.winkler[row], table.crps[row], table.relative_width[row]
         inside = (each >= -1) & (each <= 2)
         scores = inside, winkler_score(-1, 2, each, 0.9), band_crps(-1, 2, each, 0.9)
-        expected = *(score.mean(axis=0) for score in scores), 3 / spread
-        assert_allclose(found, expected, rtol=1e-12)
+        assert_allclose(found, (*(score.mean(axis=0) for score in scores), 3 / spread), rtol=1e-12)
     lower[0, 2, 1] = np.nan  # of one channel alone
     parted = coverage_table(lower[:3], upper[:3], y, 0.9)
     for k, kept in ((0, slice(0, 3)), (1, slice(1, 3))):

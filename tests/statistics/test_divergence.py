@@ -6,17 +6,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.random import default_rng
-from scipy.signal import lfilter
+from records import autoregressive
 from scipy.spatial.distance import jensenshannon
 
 from seakeep.core import density
 from seakeep.core.bootstrap import bootstrap_indices
 from seakeep.statistics import density_grid, jensen_shannon, jsd_interval, kernel_density
 
-RADIUS, ANGLE = 0.95, 2 * np.pi / 32
-MEASURED = lfilter(
-    [1.0], [1.0, -2 * RADIUS * np.cos(ANGLE), RADIUS**2], default_rng(1).standard_normal(2900)
-)[500:]
+MEASURED = autoregressive(default_rng(1).standard_normal(2400), 0.9)
 
 
 MASSES = arrays(

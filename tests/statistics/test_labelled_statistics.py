@@ -38,9 +38,8 @@ def test_divergence_of_each_channel():
     found = statistics.jsd_interval(
         PREDICTED, MEASURED, block_length=40, rng=default_rng(2), n_series=10
     )
-    children = default_rng(2).spawn(2)
     assert found["channel"].values.tolist() == ["pitch", "heave"]
-    for name, child in zip(["pitch", "heave"], children, strict=True):
+    for name, child in zip(["pitch", "heave"], default_rng(2).spawn(2), strict=True):
         alone = core_divergence.jsd_interval(
             PREDICTED[name].values, MEASURED[name].values, block_length=40, rng=child, n_series=10
         )

@@ -7,7 +7,8 @@ from numpy.random import default_rng
 from seakeep.statistics import overlap_block, two_way_interval
 
 
-def mean_of_difference(a, b):
+def mean(a, b=0.0):
+    """Of each draw: errors, or their difference, where they are judged."""
     return np.nanmean(a - b, axis=(1, 2))
 
 
@@ -29,9 +30,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(row, column, cell, ove
     rng, inside = default_rng(0), 0
     for _ in range(200):
         pair = (table(rng, row, column, cell, overlap) for _ in range(2))
-        low, high = two_way_interval(
-            mean_of_difference, *pair, rng=rng, blocks=(overlap, overlap), n_series=200
-        )
+        low, high = two_way_interval(mean, *pair, rng=rng, blocks=(overlap, overlap), n_series=200)
         inside += bool(low <= 0.0 <= high)
     # Nominally 0.95: 200 trials have a standard error of 0.015; overlapping neighbours leave five
     # blocks an axis, of which an interval falls short by some hundredths.
@@ -41,7 +40,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(row, column, cell, ove
 def test_pairs_are_kept_and_further_axes_too():
     rng = default_rng(1)
     errors = rng.normal(1.0, 0.3, (6, 8, 2))
-    low, high = two_way_interval(mean_of_difference, errors + 0.5, errors, rng=rng)
+    low, high = two_way_interval(mean, errors + 0.5, errors, rng=rng)
     np.testing.assert_allclose([low, high], 0.5)  # the same cells on both sides: no spread at all
     assert low.shape == (2,)
 
@@ -50,7 +49,7 @@ def test_cells_that_are_not_judged_are_left_out():
     rng = default_rng(2)
     errors = rng.normal(1.0, 0.1, (3, 30))
     errors[np.arange(30) % 3 != np.arange(3)[:, None]] = np.nan  # runs are left out in turn
-    low, high = two_way_interval(lambda x: np.nanmean(x, axis=(1, 2)), errors, rng=rng)
+    low, high = two_way_interval(mean, errors, rng=rng)
     assert low < 1.0 < high
 
 
@@ -58,12 +57,11 @@ def test_cells_that_are_not_judged_are_left_out():
 def test_too_few_blocks_give_no_interval_and_one_cell_is_conditioned_on():
     rng = default_rng(3)
     errors = rng.normal(1.0, 0.1, (2, 30))
-    mean = lambda x: x.mean(axis=(1, 2))  # noqa: E731
     assert np.isnan(two_way_interval(mean, errors, rng=rng)).all()
     assert np.isnan(two_way_interval(mean, errors[:1], rng=rng, blocks=(1, 12))).all()
     assert np.isfinite(two_way_interval(mean, errors[:1], rng=rng)).all()
     alone = np.where(np.arange(9)[:, None] == 4, errors[0], np.nan)  # one of nine rows is judged
-    low, high = two_way_interval(lambda x: np.nanmean(x, axis=(1, 2)), alone, rng=rng)
+    low, high = two_way_interval(mean, alone, rng=rng)
     assert low < errors[0].mean() < high
 
 
@@ -80,9 +78,8 @@ def test_neighbours_are_drawn_together():
     widths = []
     for block in (1, 2):
         low, high = two_way_interval(
-            lambda drawn: drawn.mean(axis=(1, 2)), rows, rng=default_rng(1),
-            blocks=(block, 1), n_series=4000,
-        )  # fmt: skip
+            mean, rows, rng=default_rng(1), blocks=(block, 1), n_series=4000
+        )
         widths.append(float(high - low))
     # Blocks start anywhere, so that half of them hold two pairs: the variance is 1.5 times as
     # large, and fewer blocks move the quantiles out by 5 %. 4000 draws know a width to 2 %.

@@ -79,8 +79,7 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
     spoilt = runs["unseen"].copy(deep=True)
     for name in plan.states:
         spoilt[name].values[:] = 1e6
-    again = margins({**runs, "unseen": spoilt})
-    assert_array_equal(again["margin"], found["margin"])
+    assert_array_equal(margins({**runs, "unseen": spoilt})["margin"], found["margin"])
     # The margin of one run alone is another: both count.
     fewer = {**runs, "second": runs["second"].map(lambda each: each * 1.5, keep_attrs=True)}
     assert (margins(fewer)["margin"] != found["margin"]).any()

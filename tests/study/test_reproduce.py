@@ -96,7 +96,6 @@ def test_all_acts_have_the_same_windows_and_the_recommended_model_learns_from_ot
     plan = make_plan(study_of(tmp_path))
     for each in plan.training:
         assert not set(each.left_out) & set(each.runs)
-    assert list(results) == ["paper", "raw"]
     for name, planned in plan.tests.items():
         windows = [(each.run, each.start) for each in planned]
         for result in results.values():

@@ -34,9 +34,8 @@ def test_the_parts_are_what_the_forecast_was_made_of():
     found = parts_of(groups())
     # The record is not a whole number of periods, so that its own SD differs from 0.1/√2.
     own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
-    offset = np.sqrt(np.mean((0.3 / own) ** 2))
     # The offset and the wave are not quite orthogonal over 6.9 periods: 1 % of the offset.
-    assert found["error_offset"] == pytest.approx(offset, rel=0.01)
+    assert found["error_offset"] == pytest.approx(np.sqrt(np.mean((0.3 / own) ** 2)), rel=0.01)
     assert found["amplitude_ratio"] == pytest.approx(0.8, rel=1e-9)
     assert found["phase_lead"] == pytest.approx(40.0, abs=1e-6)
     assert found["error_rest"] < 1e-6
@@ -47,8 +46,7 @@ def test_the_phase_is_the_circular_mean_over_cells():
     leads = np.radians([170.0, -160.0, -160.0])[:, None]  # the last of them past half a turn
     made["tests/t"]["mean"][:] = np.cos(TURN + leads)[..., None]
     found = parts_of(made)["phase_lead"]
-    mean = np.exp(1j * leads).mean()
-    assert found == pytest.approx(np.degrees(np.angle(mean)), abs=1e-6)
+    assert found == pytest.approx(np.degrees(np.angle(np.exp(1j * leads).mean())), abs=1e-6)
     assert found.attrs["units"] == "deg"
 
 

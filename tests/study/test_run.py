@@ -170,8 +170,7 @@ def test_results_that_name_no_study_are_not_overwritten(result, words, tmp_path)
 def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folder):
     path = study_folder / "study.toml"
     path.write_text('[study]\ncampaign = "campaign.toml"\n', "utf-8")
-    plan = make_plan(read_study(path))
-    assert {window.run for window in plan.tests["irregular"]} == {"unseen"}
+    assert {window.run for window in make_plan(read_study(path)).tests["irregular"]} == {"unseen"}
     path.write_text(path.read_text("utf-8") + '[tests.regular]\nwaves = "regular"\n', "utf-8")
     with request_error(r"not stated: irregular.*State the waves of a run"):
         make_plan(read_study(path))

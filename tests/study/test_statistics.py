@@ -184,8 +184,7 @@ def test_forecasts_that_diverge_are_named_and_count_as_infinite(tmp_path):
         r"of 'unseen' \(unseen from .* and 1 more"
     ):
         found = studied(tmp_path)
-    lost = found.groups["statistics/lost"]
-    assert set(lost["model"].values) == {"wild"}
+    assert set(found.groups["statistics/lost"]["model"].values) == {"wild"}
     boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
     assert (boxes["count"] == 6).all()
     assert np.isinf(boxes["median"].sel(model="wild"))
@@ -269,8 +268,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
 
 
 def test_medians_leave_out_what_is_not_judged():
-    rng = default_rng(1)
-    cells = rng.standard_normal((3, 8, 2))
+    cells = default_rng(1).standard_normal((3, 8, 2))
     cells[0, :5], cells[1] = np.nan, np.nan
     found = median_of(cells)
     assert_allclose(found[[0, 2]], np.nanmedian(cells[[0, 2]], axis=1))
@@ -308,8 +306,7 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
     assert at["rank"] == round(freedom)
     truncated = replace(spec, ridge=0.0, rank=round(freedom)).fit(parts, *channels)
     for name, model in {"ridge": fitted, "truncated": truncated}.items():
-        radius = at["radius"].sel(variant=name)
-        assert radius == pytest.approx(model.spectral_radius, rel=1e-12)
+        assert at["radius"].sel(variant=name) == pytest.approx(model.spectral_radius, rel=1e-12)
     window = plan.tests["unseen"][2]
     forecast = truncated.forecast(plan.runs[window.run], window.start, window.steps)
     error = nrmse(predicted=forecast, measured=plan.runs[window.run])

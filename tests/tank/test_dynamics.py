@@ -53,9 +53,8 @@ def harmonics(motion, sea, begin):
 def test_response_in_time_is_that_in_frequency(linear_rig):
     ratios = np.array([1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0])
     sea = small_sea(wavelength_to_frequency(1.4 * ratios, 3.6))
-    motion = simulate(linear_rig, sea, 500.0)
     # Surge swings on its moorings with a decay time of 70 s: the ramp hardly excites it.
-    found = harmonics(motion, sea, 350.0)
+    found = harmonics(simulate(linear_rig, sea, 500.0), sea, 350.0)
     stiffness, damping = linear_rig.mooring_stiffness, linear_rig.linear_damping
     damping = damping.copy()
     damping[0, 0] += linear_rig.lines[:, 6].sum()
@@ -66,12 +65,10 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     )
     dynamic = -(w**2) * (hydro.mass + added) - 1j * w * (radiated + damping)
     force = excitation_at(hydro, sea.omega)[..., None]
-    solved = np.linalg.solve(dynamic + hydro.stiffness + stiffness, force)
-    expected = solved[..., 0]
-    error = np.abs(np.abs(found / expected) - 1.0)[:, :3]
+    expected = np.linalg.solve(dynamic + hydro.stiffness + stiffness, force)[..., 0]
     # The issue's bound; it grants 4 % to heave at λ/L 1.5, where opposite forces of buoyancy and
     # pool all but cancel.
-    assert error.max() < 0.01
+    assert np.abs(np.abs(found / expected) - 1.0)[:, :3].max() < 0.01
     # With their phases: surge swings on its moorings for minutes.
     assert np.all(np.abs(found / expected - 1.0)[:, :3].max(axis=0) < [0.013, 0.007, 0.007])
     # The coefficients of the kernel, which ends after some time, are the file's to 1.5 %.
@@ -116,8 +113,7 @@ def test_drift_is_what_energy_and_momentum_allow(rig, length, height):
     period = tau / sea.omega[0]
     late = motion.time > motion.time[-1] - 20 * period
     absorbed = viscous_power(rig, motion, late) / sea.amplitude[0] ** 2
-    losses = sea_losses(rig, sea)
-    linear = linear_response(rig, sea.omega, losses)[0]
+    linear = linear_response(rig, sea.omega, sea_losses(rig, sea))[0]
     both = np.append(1.0, linear)
     out, along = np.real(np.conj(both) @ far_field_at(rig.hydro, sea.omega)[0] @ both)
     allowed = sea.wavenumber[0] / sea.omega[0] * (absorbed + out - along)
@@ -150,8 +146,7 @@ def test_full_transfer_function_of_two_waves(rig):
 def test_played_drift_is_that_of_its_law(linear_rig, law):
     """Two weak waves beat; the vessel swings as their force drives it on its lines."""
     damped = linear_rig.linear * [20.0, 1, 1, 1, 1]  # the start dies out in 4 s
-    drift = DriftSettings(law=law, damping=False)
-    rig = replace(linear_rig, drift=drift, linear=damped)
+    rig = replace(linear_rig, drift=DriftSettings(law=law, damping=False), linear=damped)
     sea = small_sea([4.0, 4.0 + tau / 20.0], 0.01)
     motion = simulate(rig, sea, 120.0)
     late = (motion.time > 80.0) & (motion.time < 120.0)  # two beats
@@ -224,8 +219,7 @@ def test_other_vessels_need_no_code(settings, hydro):
         **square,
     )
     lines = {"single": altered(settings.moorings["bow"], pretension=0.0)}
-    other = altered(settings, moorings=lines)
-    rig = assemble_rig(other, plain)
+    rig = assemble_rig(altered(settings, moorings=lines), plain)
     motion = simulate(rig, wave(2.8, 0.1), 30.0)
     assert len(motion.position) == 3
     assert tensions(rig, motion.position, motion.velocity).shape == (1, motion.time.size)

@@ -58,8 +58,7 @@ def test_second_order_crest_of_a_regular_wave(settings, rig):
 
 def test_dropouts_take_the_stated_share(settings, rig):
     probes = {"us": altered(settings.instruments.probes["us_fwd"], dropouts=0.05)}
-    instruments = altered(settings.instruments, probes=probes)
-    made = altered(settings, instruments=instruments)
+    made = altered(settings, instruments=altered(settings.instruments, probes=probes))
     record = record_run(play_run(made, "irregular_1", rig), default_rng(0))["wave_probes"]
     lost = np.isnan(record["us"].values)
     # About 120 bursts of uniform length: the share scatters by a tenth.
@@ -85,8 +84,7 @@ def test_slap_pulses_start_where_the_line_is_wetted():
     wet = (time % 5.0) > 4.0
     slap = SlapSettings(mean=0.2)
     pulses = slap_pulses(time, wet, slap, default_rng(0))
-    first = np.flatnonzero(pulses)[0]
-    assert time[first] == pytest.approx(4.002, abs=0.005)
+    assert time[np.flatnonzero(pulses)[0]] == pytest.approx(4.002, abs=0.005)
     heights = [np.abs(pulses[np.abs(time - at - 0.15) < 0.15]).max() for at in np.arange(4, 99, 5)]
     # Exponential with mean 0.2 N, less what the decay takes before the first crest.
     assert 0.05 < np.mean(heights) < 0.25

@@ -28,7 +28,6 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
             r"line 2, moorings\.bow\.stiffness: received -1\.0, which should be greater than 0",
         "[facility]\nwater_depth = 0": r"water_depth: received 0, .* Give a depth of 0\.01 to",
         "[facility]\nwave_band = [1.4, 0.1]": r"wave_band: a band is \[low, high\] in Hz",
-        "[simulation]\nstepp = 0.1": r"stepp: unknown key, .* Did you mean 'step'",
         "[runs.'a/b']\nwavelength = 2.0\nheight = 0.1": r"runs\.a/b: the name of a run is",
         "[runs.a]\nwavelength = 2.0": r"either a spectrum \(irregular\) or wavelength and height",
         "[runs.a]\nwavelength = 2.0\nheight = 0.1\nspectrum = { height = 0.1, peak_period = 2 }":

@@ -48,8 +48,7 @@ def test_the_track_of_a_film_is_the_motion_and_its_lamp_the_trigger(played, tmp_
 # The camera starts late by more than a twentieth of this short run, which is told.
 @pytest.mark.filterwarnings("ignore:one. video starts at:seakeep.SeakeepWarning")
 def test_a_filmed_campaign_is_prepared(filmed, tmp_path):
-    files = play(filmed, tmp_path, videos=["one"])["one"]
-    assert files["side_view"].suffix == ".mp4"
+    assert play(filmed, tmp_path, videos=["one"])["one"]["side_view"].suffix == ".mp4"
     campaign = read_campaign(tmp_path / "campaign.toml")
     assert "side_view" not in campaign.settings.runs["one"].files  # no table of a logger
     assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text("utf-8")
