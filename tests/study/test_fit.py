@@ -7,6 +7,7 @@ from math import tau
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from numpy.random import default_rng
 from oscillators import arx_run
 from said import request_error, warned
@@ -20,6 +21,7 @@ from seakeep import SeakeepWarning
 from seakeep.campaign import write_prepared
 from seakeep.models import KINDS
 from seakeep.study import compare, comparison_table, fit_campaign
+from seakeep.study.fit import find_repeat
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*shows waves of")  # of unit size
 
@@ -170,6 +172,16 @@ def test_a_test_that_repeats_its_training_is_warned_of(tmp_path):
         model = fit_campaign(whole)
     with warned(REPEATS):
         compare(model, whole)
+
+
+def test_an_input_that_is_no_elevation_repeats_no_waves():
+    winds, waves = sea(0).at(TIME), [sea(seed).at(TIME) for seed in (4, 5)]
+    runs = [
+        xr.Dataset({"wind": ("time", winds), "eta": ("time", x)}, {"time": TIME}) for x in waves
+    ]
+    found = [find_repeat(["wind", "eta"], {"a": runs[0]}, "b", run, TIME[1]) for run in runs]
+    assert found[0]["input"] == "eta"
+    assert found[1] is None
 
 
 def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halves):

@@ -316,10 +316,10 @@ def probe_separation(
                              {\sqrt{\sum_f |X_1|^2 \sum_f |X_2|^2}}
 
     is greatest. It is sought as far as the waves' groups get in a quarter of the record, upstream
-    too. In a narrow band neighbouring maxima, a wavelength apart, are nearly as high: of those
-    within a tenth of the highest, and not lower by three standard errors of the difference, the
-    one nearest to the stated separation is taken. So regular waves determine a separation within
-    half a wavelength only.
+    too, and over 100,000 places at most. In a narrow band neighbouring maxima, a wavelength apart,
+    are nearly as high: of those within a tenth of the highest, and not lower by three standard
+    errors of the difference, the one nearest to the stated separation is taken. So regular waves
+    determine a separation within half a wavelength only.
 
     Parameters
     ----------
@@ -369,13 +369,15 @@ def probe_separation(
     cross, k = cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
-    reach = max(reach, abs(place) + np.pi / k[np.argmax(np.abs(cross))])
+    least = abs(place) + np.pi / k[np.argmax(np.abs(cross))]
     step = 2 * np.pi / k[-1] / PLACES
-    if not 2 * reach / step <= MOST_PLACES:
+    most = 0.5 * MOST_PLACES * step
+    if not least <= most:
         raise RequestError(
             f"the stated separation of {place:g} m is too far for waves of {16 * step:.3g} m and a "
             f"record of {a.size * interval:.4g} s. Correct the positions of the probes (m)."
         )
+    reach = max(min(reach, most), least)
     coarse = np.arange(-reach, reach, step)
     scores = _scores(cross, k, coarse)
     best = coarse[_chosen(scores, np.argmin(np.abs(coarse - place)))]
