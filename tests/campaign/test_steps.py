@@ -243,6 +243,19 @@ def test_a_sensor_that_sticks_is_reported_in_times_that_jitter(tmp_path):
     assert stuck.details["samples"] == 40
 
 
+@pytest.mark.parametrize("mean", [-20.0, 1.0, 350.0])
+def test_a_heading_has_no_jumps_of_a_whole_turn(tmp_path, mean):
+    heading = mean + 5 * np.sin(tau * 0.1 * T)
+    columns = {"yaw [deg]": np.where(np.arange(T.size) % 500 == 7, np.nan, heading % 360)}
+    text = "[channels.yaw]\n[preparation]\nsampling_rate = 10\ngaps = 'bridge'\nlongest_gap = 1\n"
+    run = prepared(tmp_path, columns, text)
+    expected = (np.interp(run["time"], T, heading) + 180) % 360 - 180
+    # Cubics over the gaps and the filter before resampling leave 0.02 degrees.
+    assert_allclose(np.degrees(run["yaw"][10:-10]), expected[10:-10], atol=0.02)
+    (jumps,) = findings(run, "JUMPS")
+    assert jumps.details["count"] == (2 if mean == 1.0 else 0)
+
+
 def test_dates_and_seconds_of_day_are_in_step_over_midnight(tmp_path):
     """Loggers of each way to write when, some of which start after midnight, and one of none."""
     names = "shore", "mast", "excel", "matlab", "plc", "camera"

@@ -88,6 +88,8 @@ from seakeep.toml import in_seconds
 ChannelMap = dict[str, ChannelSettings]
 COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""
+JUMP = 0.9
+"""Part of a turn beyond which neighbouring readings of an angle lie on either side of its zero."""
 MOST_FINER = 8.0
 """Times finer than the fastest logger of a run that its step may be: waves of four samples get the
 32 of the paper's; with times in another unit it is 1000."""
@@ -353,12 +355,32 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
         if missing is not None:  # of float32 as well
             readings = np.where(np.isclose(readings, missing, rtol=1e-6, atol=0), np.nan, readings)
         values = each.sign * factor * (readings + each.offset)
-        attributes = {"units": target, "long_name": long_name_of(name, each.long_name)}
+        attributes: dict[str, object] = {"units": target}
+        attributes["long_name"] = long_name_of(name, each.long_name)
+        if target == "rad":
+            read, values = values, _without_jumps(values)
+            if values is not read:
+                attributes["jumps"] = int(np.sum(np.abs(np.diff(values - read)) > 1))
         accuracy = {} if each.accuracy is None else {"accuracy": factor * each.accuracy}
         variables[name] = ("time", values[records], attributes | accuracy)
     return xr.Dataset(
         variables, {"time": ("time", time[records], {"units": "s", "long_name": "time"})}
     )
+
+
+def _without_jumps(angles: FloatArray) -> FloatArray:
+    """Angles without jumps of a whole turn, whose mean lies within half a turn of zero.
+
+    So runs that cross the jump agree with those that do not.
+    """
+    known, turn = np.isfinite(angles), 2 * np.pi
+    own = np.unwrap(angles[known], discont=JUMP * turn)
+    own -= turn * round(own.mean() / turn) if own.size else 0.0
+    if np.allclose(own, angles[known]):
+        return angles
+    out = angles.copy()
+    out[known] = own
+    return out
 
 
 def cleaned(run: Run) -> Run:

@@ -47,7 +47,7 @@ from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import lengths, parse_length, read_toml, validated
 
-FORMAT = 16
+FORMAT = 17
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 PREPARED = "prepared run"
 """Kind of the files of prepared runs, which sets them apart from measurements."""

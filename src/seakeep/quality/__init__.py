@@ -38,6 +38,7 @@ CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     samples.constant,
     samples.noise,
     samples.flagged,
+    samples.jumps,
     samples.levels,
     sensors.redundant,
     sensors.derivatives,

@@ -41,6 +41,7 @@ class SamplesKind(Kind):
     OUTLIERS = "outlier" + _COUNTED
     SATURATED = "saturated" + _COUNTED
     STUCK = "stuck" + _COUNTED
+    JUMPS = "jumps by a whole turn {count} times: taken without, within half a turn of zero"
     CONSTANT = "constant at {value:.6g}"
     NOISE = "is noise: {share:.0f} % of its variance has no memory from one sample to the next"
     DRIFT = "level drifts by {value:+.3g} over the record"
@@ -115,6 +116,13 @@ def flagged(record: Record) -> Findings:
                 longest=max(end - begin for begin, end in parts) * dt,
                 done=done,
             )
+
+
+def jumps(record: Record) -> Findings:
+    """Angles that were read with jumps of a whole turn."""
+    for _, _, name, channel in record.recorded():
+        if "jumps" in channel.attrs:
+            yield record.finding(SamplesKind.JUMPS, name, count=channel.attrs["jumps"])
 
 
 def constant(record: Record) -> Findings:
