@@ -19,6 +19,8 @@ and this model. For the uncertainty over runs and training sets see
 so that their bounds are rough.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import update_wrapper
 from typing import Any, Literal, NamedTuple
