@@ -100,6 +100,7 @@ CHANGES = {
         ("samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
     ],
     "check/parts.py": [
+        ('run.attrs.get("role") == "train"', "False", "check/test_worth.py::test_a_run_without_spans_trains_where_its_role_says_so"),
         ("max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
         ("* stays", "* 1.0", "check/test_coherence.py::test_observables_lower_the_bound"),
         ("if 2 * each <= run", "if 2 * each > run", "check/test_worth.py::test_a_baseline_that_reads_a_longer_history_counts"),
@@ -493,6 +494,7 @@ CHANGES = {
         ("drifts = self.surge is not None and not", "drifts = self.surge is None and not", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
     ],
     "pairing.py": [
+        ('in ("variable", "channel")', 'in ("variable",)', "test_metrics.py::test_channels_are_matched_by_name_and_instants_by_time"),
         ("tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
     ],
     "quality/clocks.py": [
