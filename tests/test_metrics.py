@@ -127,10 +127,13 @@ def test_channels_are_matched_by_name_and_instants_by_time():
     moved = predicted.assign_coords(time=predicted.time + 1e-9)
     assert metrics.anrmse(predicted=moved, measured=measured) == metrics.anrmse(**both())
     frame = predicted.to_dataframe()[["heave", "mooring_bow"]]
-    stacked = predicted.to_dataarray("channel")  # (channel, time)
+    stacked = predicted.to_dataarray("load")  # (load, time)
     for each in (frame, stacked, stacked.T):
         found = metrics.nrmse(predicted=each, measured=measured)
         assert found.equals(metrics.nrmse(predicted=predicted, measured=measured))
+    means = stacked.expand_dims(statistic=["mean"]).transpose("load", ...)
+    mean = metrics.nrmse(predicted=means, measured=measured).isel(statistic=0, drop=True)
+    assert mean.equals(found)
     with request_error("received predicted: DataFrame, measured: ndarray"):
         metrics.nrmse(predicted=frame, measured=MEASURED)
     with data_error("no coordinate 'time' in channel 'heave'"):

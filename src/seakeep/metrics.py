@@ -1,14 +1,14 @@
 """Error measures of a forecast, for arrays and for Datasets.
 
-All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays are
-``(…, time, channel)``. With Datasets the channels of `predicted` are judged at its instants, each
-against the variable of the same name in `measured`; text, such as the status of an ensemble's
-members, is not judged. DataFrames over an index ``time``, and DataArrays with the names of channels
-along ``variable`` or ``channel``, are taken as Datasets. Measures per channel return a Dataset of
-numbers. A channel whose measured standard deviation in the window is below 1 % of its training
-standard deviation (a slack line), or more than half of whose variance is noise, is NaN and left out
-of averages; forecasts carry the training standard deviation in the attribute ``training_std`` of
-each channel, prepared runs that of the noise in ``noise_std``.
+All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays are ``(…, time,
+channel)``. With Datasets the channels of `predicted` are judged at its instants, each against the
+variable of the same name in `measured`; text, such as the status of an ensemble's members, is not
+judged. DataFrames over an index ``time``, and DataArrays with a dimension of names, are taken as
+Datasets. Measures per channel return a Dataset of numbers. A channel whose measured standard
+deviation in the window is below 1 % of its training standard deviation (a slack line), or more than
+half of whose variance is noise, is NaN and left out of averages; forecasts carry the training
+standard deviation in the attribute ``training_std`` of each channel, prepared runs that of the
+noise in ``noise_std``.
 
 With ``interval=0.95`` a measure gives the bounds of its interval instead of its value, along a
 first axis (lower, upper; of Datasets the dimension ``bound``). Predicted and measured samples are

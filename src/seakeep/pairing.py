@@ -37,8 +37,8 @@ class Paired:
 def named_sides(**sides: Any) -> Groups:
     """Datasets of all sides, none where no side names its channels; names on some are refused.
 
-    A DataFrame with columns of words is one over its index, a DataArray one over ``time`` where a
-    dimension ``variable`` or ``channel`` holds words.
+    A DataFrame whose columns have names is one over its index, a DataArray one where a single
+    dimension, but for ``statistic``, holds names.
     """
     found = {side: each for side, value in sides.items() if (each := _named(value)) is not None}
     if found and len(found) < len(sides):
@@ -49,10 +49,10 @@ def named_sides(**sides: Any) -> Groups:
 
 def _named(value: Any) -> xr.Dataset | None:
     if isinstance(value, xr.DataArray):
-        for dim in ("variable", "channel"):
-            if dim in value.coords and value[dim].dtype.kind in "OU":
-                return value.to_dataset(dim)
-    elif hasattr(value, "columns") and all(isinstance(each, str) for each in value.columns):
+        words = [dim for dim, index in value.indexes.items() if index.dtype.kind in "OU"]
+        names = [dim for dim in words if dim != "statistic"]
+        return value.to_dataset(names[0]) if len(names) == 1 else None
+    if hasattr(value, "columns") and all(isinstance(each, str) for each in value.columns):
         return xr.Dataset.from_dataframe(value)
     return value if isinstance(value, xr.Dataset) else None
 
