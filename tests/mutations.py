@@ -82,6 +82,9 @@ CHANGES = {
         ("if each[1] >= FEWEST] or counted", "] or counted", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
         ("or steady > NOISY * period", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
+    "arrays.py": [
+        ("except (TypeError, ValueError) as why", "except ValueError as why", "test_arrays.py::test_what_the_message_says"),
+    ],
     "check/motion.py": [
         ("decrements = 2 * np.log", "decrements = np.log", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
         ("p / np.hypot(2 * np.pi, p)", "p / (2 * np.pi)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
