@@ -99,7 +99,7 @@ BAD = {
     "timedelta64": lambda x: np.asarray(x * 1e3).astype("timedelta64[ms]"),
     "text": lambda x: x.astype(str),
     "a word": lambda x: "heave",
-    "nothing": lambda x: None,
+    "nothing": lambda x: [None],
     "objects": lambda x: np.where(x > np.median(x), x.astype(object), None),
     "a Dataset": lambda x: xr.Dataset({"heave": ("time", x.ravel())}),
 }
@@ -109,6 +109,8 @@ def test_every_public_function_shows_the_type_of_each_argument():
     for name, function in FUNCTIONS.items():
         shown = inspect.signature(function).parameters
         assert [each for each in shown.values() if each.annotation is each.empty] == [], name
+        # By the name of its type, which NumPy's types of arrays lose in hundreds of characters.
+        assert "numpy._typing" not in f"{shown}", name
 
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
@@ -121,9 +123,9 @@ def test_sound_arguments_pass_and_what_is_no_array_of_real_numbers_is_refused(na
     sound = {each.name: SOUND.get(f"{name}.{each.name}", SOUND.get(each.name)) for each in wanted}
     called(name, sound)
     for each in wanted:
-        for kind, spoil in BAD.items() if each.annotation == "npt.ArrayLike" else ():
+        for kind, spoil in BAD.items() if each.annotation.endswith("ArrayLike") else ():
             if not (kind == "a Dataset" and name == "moving_block_bootstrap"):
-                with pytest.raises((SeakeepError, TypeError, ValueError)):
+                with pytest.raises(SeakeepError):
                     called(name, sound | {each.name: spoil(np.asarray(sound[each.name]))})
 
 
@@ -135,6 +137,8 @@ def test_sound_arguments_pass_and_what_is_no_array_of_real_numbers_is_refused(na
         r"x must be real numbers; received ndarray of type complex128. Give its real": X + 1j,
         r"type datetime64\[s\]. Give seconds: \(t - t\[0\]\)": T.astype("datetime64[s]"),
         r"received list of type <U1. Convert the text to numbers": ["a", "b"],
+        r"x must be one array .*; received Dataset. Give a channel": xr.Dataset({"heave": 1.0}),
+        "received list. Give .*rows of one length": [[1.0], [1.0, 2.0]],
         r"type object. Convert every value to a number, gaps to NaN": [1.0, None],
     }.items(),
 )

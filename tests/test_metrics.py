@@ -7,7 +7,7 @@ from near import assert_near
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from records import autoregressive
-from said import request_error
+from said import data_error, request_error
 
 from seakeep import metrics
 
@@ -127,6 +127,18 @@ def test_channels_are_matched_by_name_and_instants_by_time():
     assert metrics.anrmse(predicted=predicted, measured=measured) == metrics.anrmse(**both())
     moved = predicted.assign_coords(time=predicted.time + 1e-9)
     assert metrics.anrmse(predicted=moved, measured=measured) == metrics.anrmse(**both())
+    frame = predicted.to_dataframe()[["heave", "mooring_bow"]]
+    stacked = predicted.to_dataarray("load")  # (load, time)
+    for each in (frame, stacked, stacked.T):
+        found = metrics.nrmse(predicted=each, measured=measured)
+        assert found.equals(metrics.nrmse(predicted=predicted, measured=measured))
+    means = stacked.expand_dims(statistic=["mean"]).transpose("load", ...)
+    mean = metrics.nrmse(predicted=means, measured=measured).isel(statistic=0, drop=True)
+    assert mean.equals(found)
+    with request_error("received predicted: DataFrame, measured: ndarray"):
+        metrics.nrmse(predicted=frame, measured=MEASURED)
+    with data_error("no coordinate 'time' in channel 'heave'"):
+        metrics.nrmse(predicted=frame.reset_index(drop=True), measured=measured)
     # A forecast carries the training spread that finds slack lines; what is passed comes first.
     predicted.heave.attrs["training_std"] = 1e3
     assert np.isnan(metrics.nrmse(predicted=predicted, measured=measured).heave)

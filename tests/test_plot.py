@@ -40,6 +40,24 @@ def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
         seakeep.plot.overlay(forecast, run, axes=given)
 
 
+def test_a_measurement_is_drawn_at_its_own_instants_as_far_as_it_goes(run, model):
+    forecast = model.forecast(run, **WHEN)
+    other = run.interp(time=np.arange(9.93, 16.0, 0.03))
+    for last, measured in {11.9: run.sel(time=slice(11.95)), 14.99: other}.items():
+        drawn, _ = seakeep.plot.overlay(forecast, measured).axes[0].get_lines()
+        at = measured.sel(time=slice(10.1 - 1e-6, 15.0 + 1e-6))
+        np.testing.assert_array_equal(drawn.get_data(), [at.time, at.surge])
+        assert drawn.get_xdata()[-1] == pytest.approx(last, abs=0.02)
+    with request_error(r"forecast is a DataArray; a run is an xarray\.Dataset"):
+        seakeep.plot.overlay(forecast.heave, run)
+
+
+def test_modes_are_drawn_of_the_check_that_knows_their_states(model):
+    assert len(seakeep.plot.modes(seakeep.check.modes(model)).axes) == 2
+    with request_error(r"Draw that of seakeep\.check\.modes\(model\)"):
+        seakeep.plot.modes(model.modes())
+
+
 def test_band_takes_members_or_their_statistics(run, model):
     ensemble = few().fit(run, ["heave"], ["eta"])
     members = ensemble.forecast(run, **WHEN)
@@ -48,7 +66,7 @@ def test_band_takes_members_or_their_statistics(run, model):
         assert len(figure.axes[0].collections) == 1
     with request_error(r"Channels: none\. .*with seakeep\.plot\.band"):
         seakeep.plot.overlay(members, run)
-    with request_error(r"measured has no channel .* in a coordinate 'time'"):
+    with request_error(r"measured has no coordinate 'time'"):
         seakeep.plot.band(members, run.drop_vars("time"))
     with request_error(r"it has no band\. Draw it with seakeep\.plot\.overlay"):
         seakeep.plot.band(model.forecast(run, **WHEN), run)

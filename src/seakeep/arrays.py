@@ -70,7 +70,7 @@ def as_real(
     Raises
     ------
     RequestError
-        If they are not real numbers: masked values, complex, dates or text.
+        If they are not real numbers: masked values, complex, dates or text, Datasets.
 
     Examples
     --------
@@ -87,7 +87,14 @@ def as_real(
             "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
             "gap, or leave them out."
         )
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as why:  # a Dataset, or rows of several lengths
+        kind = type(values).__name__
+        raise error(
+            f"{name} must be one array of real numbers; received {kind}. Give a channel, such as "
+            f"run['heave'], or rows of one length. ({why})"
+        ) from None
     if array.dtype.kind not in "fiub":
         remedy = _REMEDIES.get(array.dtype.kind, "Convert every value to a number, gaps to NaN")
         raise error(

@@ -1,13 +1,14 @@
 """Error measures of a forecast, for arrays and for Datasets.
 
-All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays are
-``(…, time, channel)``. With Datasets the channels of `predicted` are judged at its instants, each
-against the variable of the same name in `measured`; text, such as the status of an ensemble's
-members, is not judged. Measures per channel return a Dataset of numbers. A channel whose
-measured standard deviation in the window is below 1 % of its training standard deviation (a slack
-line), or more than half of whose variance is noise, is NaN and left out of averages; forecasts
-carry the training standard deviation in the attribute ``training_std`` of each channel, prepared
-runs that of the noise in ``noise_std``.
+All take ``predicted=`` and ``measured=`` by keyword, in the same units. Arrays are ``(…, time,
+channel)``. With Datasets the channels of `predicted` are judged at its instants, each against the
+variable of the same name in `measured`; text, such as the status of an ensemble's members, is not
+judged. DataFrames over an index ``time``, and DataArrays with a dimension of names, are taken as
+Datasets. Measures per channel return a Dataset of numbers. A channel whose measured standard
+deviation in the window is below 1 % of its training standard deviation (a slack line), or more than
+half of whose variance is noise, is NaN and left out of averages; forecasts carry the training
+standard deviation in the attribute ``training_std`` of each channel, prepared runs that of the
+noise in ``noise_std``.
 
 With ``interval=0.95`` a measure gives the bounds of its interval instead of its value, along a
 first axis (lower, upper; of Datasets the dimension ``bound``). Predicted and measured samples are
@@ -18,6 +19,8 @@ and this model. For the uncertainty over runs and training sets see
 :func:`seakeep.statistics.two_way_interval`. Extremes (NAMMAE) are redrawn from the measured ones,
 so that their bounds are rough.
 """
+
+from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import update_wrapper
@@ -189,19 +192,15 @@ def labelled(
             noise_std: npt.ArrayLike | None = None,
             interval: float | None = None,
         ) -> Any:
-            if isinstance(predicted, xr.Dataset) != isinstance(measured, xr.Dataset):
-                raise RequestError(
-                    "predicted and measured must both be Datasets or both be arrays; received "
-                    f"{type(predicted).__name__} and {type(measured).__name__}."
-                )
+            sides = pairing.named_sides(predicted=predicted, measured=measured)
             if interval is not None and keeps == "time":
                 raise RequestError(
                     f"{name} has a value at each instant, and no interval over time."
                 )
-            if not isinstance(predicted, xr.Dataset):
+            if not sides:
                 values = _valued(of, paired(predicted, measured, training_std, noise_std), interval)
                 return values if values.ndim else values.item()
-            pairs, pair = _paired(predicted, measured, training_std, noise_std)
+            pairs, pair = _paired(**sides, training_std=training_std, noise_std=noise_std)
             values = _valued(of, pair, interval)
             coords: dict[str, Any] = {} if interval is None else {"bound": list(BOUNDS)}
             dims = (*coords, *pairs.lead)
@@ -220,7 +219,8 @@ def labelled(
             if values.ndim == 0:
                 return values.item()
             dims += ("time",) * (keeps == "time")
-            coords |= {dim: predicted[dim] for dim in dims if dim in predicted.coords}
+            first = sides["predicted"]
+            coords |= {dim: first[dim] for dim in dims if dim in first.coords}
             return xr.DataArray(
                 values, coords, dims, of.__name__, {"units": units, "long_name": name}
             )
@@ -334,6 +334,9 @@ def nrmse(pair: Pair) -> FloatArray:
         Standard deviations of the noise, by default the ones that prepared runs carry
         (:func:`seakeep.signals.waves.noise_floor`); a channel more than half of whose measured
         variance is noise is NaN.
+    interval : float, optional
+        Probability, such as 0.95, between bounds that take the place of the value: a first axis,
+        or dimension ``bound``, of lower and upper (:mod:`seakeep.metrics` says how they are drawn).
 
     Returns
     -------
@@ -365,7 +368,7 @@ def anrmse(pair: Pair) -> FloatArray:
 
     Parameters
     ----------
-    predicted, measured, training_std, noise_std
+    predicted, measured, training_std, noise_std, interval
         As for :func:`nrmse`.
 
     Returns
@@ -410,7 +413,7 @@ def normalised_extremes_error(pair: Pair) -> FloatArray:
 
     Parameters
     ----------
-    predicted, measured, training_std, noise_std
+    predicted, measured, training_std, noise_std, interval
         As for :func:`nrmse`.
 
     Returns
@@ -432,7 +435,7 @@ def nammae(pair: Pair) -> FloatArray:
 
     Parameters
     ----------
-    predicted, measured, training_std, noise_std
+    predicted, measured, training_std, noise_std, interval
         As for :func:`nrmse`.
 
     Returns
@@ -454,7 +457,7 @@ def fit_percent(pair: Pair) -> FloatArray:
 
     Parameters
     ----------
-    predicted, measured, training_std, noise_std
+    predicted, measured, training_std, noise_std, interval
         As for :func:`nrmse`.
 
     Returns

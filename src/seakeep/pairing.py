@@ -1,11 +1,12 @@
 """Pairs of channels: those of one Dataset, each with that of the same name in others."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, Groups
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.signals.time_axis import check_order, instant_text, usual_step
 
@@ -31,6 +32,29 @@ class Paired:
     names: list[str]
     lead: tuple[str, ...]
     arrays: dict[str, FloatArray]
+
+
+def named_sides(**sides: Any) -> Groups:
+    """Datasets of all sides, none where no side names its channels; names on some are refused.
+
+    A DataFrame whose columns have names is one over its index, a DataArray one where a single
+    dimension, but for ``statistic``, holds names.
+    """
+    found = {side: each for side, value in sides.items() if (each := _named(value)) is not None}
+    if found and len(found) < len(sides):
+        words = ", ".join(f"{side}: {type(each).__name__}" for side, each in sides.items())
+        raise RequestError(f"give Datasets throughout, or arrays throughout; received {words}.")
+    return found
+
+
+def _named(value: Any) -> xr.Dataset | None:
+    if isinstance(value, xr.DataArray):
+        words = [dim for dim, index in value.indexes.items() if index.dtype.kind in "OU"]
+        names = [dim for dim in words if dim != "statistic"]
+        return value.to_dataset(names[0]) if len(names) == 1 else None
+    if hasattr(value, "columns") and all(isinstance(each, str) for each in value.columns):
+        return xr.Dataset.from_dataframe(value)
+    return value if isinstance(value, xr.Dataset) else None
 
 
 def channel_names(data: xr.Dataset, name: str) -> list[str]:

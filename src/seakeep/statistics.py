@@ -2,8 +2,9 @@
 
 Series are arrays or one-dimensional DataArrays of uniform samples without gaps.
 :func:`moving_block_bootstrap`, :func:`jsd_interval` and :func:`coverage` take Datasets too, channel
-by channel; text, such as the status of an ensemble's members, is left out. All draws come from the
-`numpy.random.Generator` that is passed.
+by channel, and the last two DataFrames and DataArrays whose channels have names; text, such as the
+status of an ensemble's members, is left out. All draws come from the `numpy.random.Generator` that
+is passed.
 """
 
 import functools
@@ -42,7 +43,7 @@ from seakeep.core.density import (
 )
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, RequestError, naming, warn
-from seakeep.pairing import channel_names, pair
+from seakeep.pairing import channel_names, named_sides, pair
 
 __all__ = [
     "BandCoverage",
@@ -69,15 +70,6 @@ __all__ = [
     "two_way_interval",
     "winkler_score",
 ]
-
-
-def _are_datasets(**sides: Any) -> bool:
-    """Whether all sides are Datasets; some of them alone are refused."""
-    labelled = sum(isinstance(each, xr.Dataset) for each in sides.values())
-    if labelled not in (0, len(sides)):
-        words = ", ".join(f"{side}: {type(each).__name__}" for side, each in sides.items())
-        raise RequestError(f"give Datasets throughout, or arrays throughout; received {words}.")
-    return labelled > 0
 
 
 @functools.wraps(bootstrap.moving_block_bootstrap)
@@ -114,16 +106,16 @@ def jsd_interval(
     predicted: Any, measured: Any, *, rng: np.random.Generator, **settings: Any
 ) -> Any:
     """Judge each channel with a child of the generator; one that has none is named."""
-    if not _are_datasets(predicted=predicted, measured=measured):
+    if not (sides := named_sides(predicted=predicted, measured=measured)):
         return density.jsd_interval(predicted, measured, rng=rng, **settings)
     if settings.pop("grid", None) is not None:
         raise RequestError("channels of a Dataset have grids of their own; leave grid out.")
-    pairs = pair(predicted=predicted, measured=measured)
+    pairs = pair(**sides)
     p, m = pairs.arrays["predicted"], pairs.arrays["measured"]
     if m.ndim > 2:
         raise RequestError(
-            f"measured has the dimensions {measured[pairs.names[0]].dims}; ('time',) is needed. "
-            "Select one run."
+            f"measured has the dimensions {sides['measured'][pairs.names[0]].dims}; ('time',) is "
+            "needed. Select one run."
         )
     draws = []
     for column, (name, child) in enumerate(zip(pairs.names, rng.spawn(p.shape[-1]), strict=True)):
@@ -146,9 +138,9 @@ def jsd_interval(
 @functools.wraps(bands.coverage)
 def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     """Judge the channels of all; one with gaps is named."""
-    if not _are_datasets(lower=lower, upper=upper, measured=measured):
+    if not (sides := named_sides(lower=lower, upper=upper, measured=measured)):
         return bands.coverage(lower, upper, measured)
-    pairs = pair(lower=lower, upper=upper, measured=measured)
+    pairs = pair(**sides)
     names, lead = pairs.names, pairs.lead
     m = pairs.arrays["measured"]
     for column, name in enumerate(names):
@@ -160,8 +152,8 @@ def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     band = bands.coverage(**pairs.arrays)
     return xr.Dataset(
         {key: ((*lead, "channel"), values) for key, values in vars(band).items()},
-        coords=_channels(names, measured)
-        | {dim: lower[dim] for dim in lead if dim in lower.coords},
+        coords=_channels(names, sides["measured"])
+        | {dim: sides["lower"][dim] for dim in lead if dim in sides["lower"].coords},
     )
 
 
@@ -176,21 +168,20 @@ def coverage_table(
     lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None
 ) -> Any:
     """Judge the channels of all, by parts of the horizon and by wave height."""
-    if not _are_datasets(lower=lower, upper=upper, measured=measured):
+    if not (sides := named_sides(lower=lower, upper=upper, measured=measured)):
         return bands.coverage_table(lower, upper, measured, level, waves)
-    pairs = pair(lower=lower, upper=upper, measured=measured)
-    heights = None
-    if waves is not None:
+    pairs = pair(**sides)
+    if isinstance(waves, xr.DataArray):
         first = pairs.names[0]  # a height beside the bounds of a channel, at their instants
         alone = xr.Dataset({first: waves.assign_attrs(units="")})
-        heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]
-    shares = bands.coverage_table(**pairs.arrays, level=level, waves=heights)
+        waves = pair(lower=sides["lower"][[first]], waves=alone).arrays["waves"][..., 0]
+    shares = bands.coverage_table(**pairs.arrays, level=level, waves=waves)
     return xr.Dataset(
         {
             key: (("part", "channel")[: np.ndim(values)], values)
             for key, values in vars(shares).items()
             if key != "parts"
         },
-        coords={"part": list(shares.parts), **_channels(pairs.names, measured)},
+        coords={"part": list(shares.parts), **_channels(pairs.names, sides["measured"])},
         attrs={"level": level},
     )

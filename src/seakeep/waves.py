@@ -4,6 +4,8 @@ The dispersion relation is :math:`\omega^2 = g k \tanh(k h)`. Frequencies are an
 lengths in metres; all functions take scalars or arrays and broadcast.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from seakeep.arrays import ArrayLike, FloatArray, as_real, undefined

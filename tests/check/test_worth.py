@@ -11,6 +11,7 @@ from seakeep.baselines import FIR, Mean
 from seakeep.check import Checked, check_model, validity, worth
 from seakeep.check.parts import free_runs
 from seakeep.report.check_page import check_sections
+from seakeep.study import training_runs
 
 STATES = ["surge", "heave"]
 
@@ -80,6 +81,17 @@ def test_training_is_judged_apart(model, runs, checked):
     alone = check_model(model, {"train": runs["train"]})
     assert "training_residuals" not in alone.results
     assert check_sections(alone)[0].points[0].startswith("No run tests the model.")
+
+
+def test_a_run_without_spans_trains_where_its_role_says_so(model, runs):
+    stated = {name: run.drop_attrs(deep=False) for name, run in runs.items()}
+    stated["train"].attrs["role"] = "train"
+    found, expected = (worth(model, {**of, "two": runs["two"]}) for of in (stated, runs))
+    assert found.equals(expected)
+    assert worth(model, {"train": stated["train"]}).attrs["of"] == "training"
+    whole = training_runs(stated)["train"]
+    assert [*training_runs(stated)] == ["train"]
+    assert whole.equals(runs["train"])
 
 
 def worded(found, **more):

@@ -59,6 +59,12 @@ def test_a_study(tutorial, monkeypatch):
     assert page("tutorial/study.toml").partition("\n\n")[2] == shown
 
 
+@pytest.mark.usefixtures("tutorial")
+def test_runs_in_memory():
+    section = page("howto/data.md").partition("## Runs in memory\n")[2]
+    play(section.partition("\n## ")[0])
+
+
 def test_other_programs_whose_c_prints_what_python_does(tutorial):
     for name in ("fmpy", "onnx", "onnxruntime"):
         pytest.importorskip(name)

@@ -57,3 +57,13 @@ def test_coverage_of_each_channel():
     assert found["unit"].values.tolist() == ["m", "rad"]
     # The difference of numbers of order 100.
     assert found["width"].values == pytest.approx(2.0, rel=1e-12)
+    frames = [each.to_dataframe() for each in (whole - 1, whole + 1, MEASURED)]
+    assert statistics.coverage(*frames).inside.values.tolist() == [1.0, 1.0]
+
+
+def test_heights_of_waves_are_given_with_instants_or_one_per_instant():
+    height, bounds = np.abs(MEASURED["surge"]), (PREDICTED - 1, PREDICTED + 1, MEASURED)
+    expected = statistics.coverage_table(*bounds, waves=height)
+    assert expected.sizes["part"] > statistics.coverage_table(*bounds).sizes["part"]
+    for waves in (height.values, height.values.tolist()):
+        assert statistics.coverage_table(*bounds, waves=waves).equals(expected)

@@ -77,15 +77,17 @@ def irregular(runs: Datasets, what: str) -> Groups:
     return skipped
 
 
-def of_part(runs: Datasets, part: str) -> Groups:
-    """Runs in waves with a span that trains ("train") or tests ("test"), and with this span alone.
+def uses_of(run: xr.Dataset) -> list[str]:
+    """What a run serves, "train" or "test": as its spans say, else its role, else a test."""
+    spans = [use for use in ("train", "test") if f"{use}_span" in run.attrs]
+    return spans or ["train" if run.attrs.get("role") == "train" else "test"]
 
-    A run that states neither span tests as a whole.
-    """
-    wanted, other = f"{part}_span", {"train": "test_span", "test": "train_span"}[part]
-    parts = {}
+
+def of_part(runs: Datasets, part: str) -> Groups:
+    """Runs in waves that train ("train") or test ("test"), with the span of this use alone."""
+    other, parts = {"train": "test_span", "test": "train_span"}[part], {}
     for name, run in in_waves(runs).items():
-        if wanted in run.attrs or (part == "test" and other not in run.attrs):
+        if part in uses_of(run):
             parts[name] = run.copy(deep=False)
             parts[name].attrs.pop(other, None)
     return parts

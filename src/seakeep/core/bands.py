@@ -6,6 +6,8 @@ constant margin, or the half-width is a factor times a scale that follows the me
 one that is learnt from spread, horizon and waves.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

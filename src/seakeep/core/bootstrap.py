@@ -13,6 +13,8 @@ overlap are drawn together, in circular blocks. Student's distribution accounts 
 there are (:func:`seakeep.core.bootstrap.student_interval`).
 """
 
+from __future__ import annotations
+
 import math
 import warnings
 from collections.abc import Callable, Sequence

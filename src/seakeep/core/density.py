@@ -6,6 +6,8 @@ A density is (paper, eq. PDF)
 Jensen–Shannon divergence of two series has an interval and a noise floor (paper, eq. JSD).
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

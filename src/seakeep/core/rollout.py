@@ -17,6 +17,8 @@ of :math:`O_K` costs little: its product with the shift moves it by N, and that 
 A long run is taken in pieces, so that what is held beside the result does not grow with its length.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -97,7 +97,8 @@ def check_run(run: object, name: str) -> None:
     if not isinstance(run, xr.Dataset):
         raise RequestError(
             f"{name} is a {type(run).__name__}; a run is an xarray.Dataset with the dimension "
-            "'time' and one variable per channel. Build one, or read it with seakeep.read_campaign."
+            "'time' and one variable per channel. Build one, such as of a DataFrame over an index "
+            "'time' by to_xarray(), or read it with seakeep.read_campaign."
         )
     if "time" not in run.dims or "time" not in run.coords:
         raise RequestError(

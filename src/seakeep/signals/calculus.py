@@ -1,5 +1,7 @@
 """Integrals, derivatives and envelopes of series, and the join of two sensors of one motion."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 

@@ -4,6 +4,8 @@ All functions filter along the first axis, take one series or several side by si
 array of the shape they were given.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

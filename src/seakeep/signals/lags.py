@@ -1,5 +1,7 @@
 """Lag of one series behind another: over a whole record, and window by window."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

@@ -1,5 +1,7 @@
 """Waves to come: what an autoregressive model of a record expects, and what a probe up-wave saw."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from itertools import pairwise

@@ -14,6 +14,8 @@ spent on waves that do not occur; noise on the diagonal keeps the filter short a
 distance is that to the slow position of the vessel.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -5,6 +5,8 @@ Axes: x along the waves, y, z up; roll, pitch and yaw are right-handed about the
 Angular velocities and accelerations are those a gyroscope fixed in the body gives.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -4,6 +4,8 @@ A :class:`Clock` is found from pulses that both loggers record, from a signal th
 from the lag between two related signals, window by window.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -3,6 +3,8 @@
 And repeated inputs: a test input that repeats a training input makes the test meaningless.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

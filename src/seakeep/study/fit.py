@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import prepared_folder
-from seakeep.check.parts import whole_span
+from seakeep.check.parts import uses_of, whole_span
 from seakeep.conventions import in_waves
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
@@ -47,7 +47,8 @@ def training_runs(prepared: Datasets, window: int | None = None) -> Groups:
     Returns
     -------
     dict of str to Dataset
-        Each cut at the end of its ``train_span``.
+        Each cut at the end of its ``train_span``; a run with the ``role`` "train" and without
+        spans is taken as a whole.
 
     Raises
     ------
@@ -56,8 +57,9 @@ def training_runs(prepared: Datasets, window: int | None = None) -> Groups:
     """
     runs = {}
     for name, run in prepared.items():
-        if (span := run.attrs.get("train_span")) is None:
+        if "train" not in uses_of(run):
             continue
+        span = whole_span(run, "train")
         runs[name] = between(run, span)
         if window is not None and runs[name].sizes["time"] >= window:
             runs[name] = between(run, (float(run["time"][0]), span[1]))

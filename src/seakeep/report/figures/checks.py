@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.conventions import displayed
+from seakeep.errors import RequestError
 from seakeep.report.style import (
     COLOURS,
     LINES,
@@ -181,7 +182,17 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     Returns
     -------
     Figure
+
+    Raises
+    ------
+    RequestError
+        If the result has no ``participation``, as that of a model's own ``modes``.
     """
+    if "participation" not in result:
+        raise RequestError(
+            "the result does not say which states take part in a mode. Draw that of "
+            "seakeep.check.modes(model)."
+        )
     at = result.head(mode=most)
     states, shares = at["state"].values.tolist(), at["participation"].values
     words = [

@@ -14,6 +14,7 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.errors import RequestError
 from seakeep.models import summarize
+from seakeep.models.labelled import check_run
 from seakeep.quality import findings_of
 from seakeep.quality.faults import FLAGS
 from seakeep.quality.sensors import LATE, Agreement
@@ -89,13 +90,16 @@ class Curve(NamedTuple):
     calibrated: Sequence[Values] = ()
 
 
-def draw_history(axes: Any, time: Any, measured: Values, curves: Sequence[Curve]) -> None:
-    """Draw bands, the measurement and forecasts over time."""
+def draw_history(
+    axes: Any, time: Any, measured: Values, curves: Sequence[Curve], at: Any = None
+) -> None:
+    """Draw bands, the measurement and forecasts over time; `at` are other instants measured."""
     banded = [each for each in curves if each.band]
     band = {"alpha": 0.3 if len(curves) == 1 else 0.2, "linewidth": 0.6}
     for each in banded:
         axes.fill_between(time, *each.band, label=each.words, color=each.line["color"], **band)
-    axes.plot(time, measured, label="measured", **LINES["thin" if banded else "measured"])
+    line = LINES["thin" if banded else "measured"]
+    axes.plot(time if at is None else at, measured, label="measured", **line)
     for each in curves:
         edge = {**each.line, "linewidth": 0.7, "linestyle": "-", "alpha": 0.6}
         for bound, label in zip(each.calibrated, ("calibrated", None), strict=False):
@@ -248,7 +252,7 @@ def overlay(forecast: xr.Dataset, measured: xr.Dataset, *, axes: Places = None) 
     forecast : Dataset
         From :meth:`seakeep.HankelDMDcModel.forecast`.
     measured : Dataset
-        The run; the instants of the forecast are drawn.
+        The run, drawn from the first instant of the forecast to its last, or as far as it goes.
     axes : Axes or sequence of Axes, optional
         One for each channel; by default those of a new figure.
 
@@ -296,9 +300,11 @@ def band(
 def _histories(
     forecast: xr.Dataset, bounds: xr.Dataset | None, measured: xr.Dataset, axes: Places
 ) -> Figure:
+    check_run(forecast, "forecast")
+    check_run(measured, "measured")
     chosen = [str(name) for name, each in forecast.data_vars.items() if "time" in each.dims]
     for what, data in (("forecast", forecast), ("measured", measured)):
-        known = [n for n in data.data_vars if data[n].dims == ("time",) and "time" in data.coords]
+        known = [name for name, each in data.data_vars.items() if each.dims == ("time",)]
         for name in chosen:
             if name not in known:
                 raise RequestError(
@@ -315,7 +321,7 @@ def _histories(
         if bounds is not None:
             sides = [factor * bounds[name].sel(statistic=each) for each in ("lower", "upper")]
             curve = Curve("mean", LINES["ensemble"], curve.values, sides, "band")
-        draw_history(place, at["time"], factor * at[name], [curve])
+        draw_history(place, time, factor * at[name], [curve], at["time"])
         place.set_ylabel(label, fontsize=8)
         place.margins(x=0.01)
     places[-1].set_xlabel("time [s]")
