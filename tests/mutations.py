@@ -287,6 +287,8 @@ CHANGES = {
         ("(error / square - apart / variance)", "(error / square)", "test_metrics.py::test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says"),
     ],
     "models/alignment.py": [
+        ('labelled.check_units(run, settings.surge_channel, "m", name)', "pass", "models/test_alignment.py::test_a_measured_surge_in_other_units_than_metres_is_refused"),
+        ('labelled.check_units(run, surge, "m", name)', "pass", "models/test_following.py::test_a_surge_in_other_units_than_metres_is_refused"),
         ("carrier.at(surge[read] + offset,", "carrier.at(offset - surge[read],", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),

@@ -57,6 +57,9 @@ def test_a_surge_in_other_units_than_metres_is_refused(drifts):
         match=r" 1200 m in training, 2[0-9]{2} wavelengths\. Check that 'surge' is in metres",
     ):
         SPEC.fit(far, STATES, INPUTS)
+    stated = [run.assign(surge=run["surge"].assign_attrs(units="cm")) for run in drifts]
+    with pytest.raises(DataError, match=r"'surge' of run is in 'cm'; 'm' is expected\. Convert"):
+        SPEC.fit(stated, STATES, INPUTS)
 
 
 def test_a_ridge_weighs_a_hundred_times_on_powers(models):

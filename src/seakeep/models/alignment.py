@@ -387,6 +387,7 @@ class FittedAlignment:
         if settings.surge != "none":  # read where it is allowed, and no further
             channel = [settings.surge_channel]
             surge = labelled.channel_matrix(run, channel, name)[:last, 0]
+            labelled.check_units(run, settings.surge_channel, "m", name)
             for span in spans:
                 known = surge[span.first : span.stop, None]
                 labelled.check_finite(known, channel, run, name, span.first)
@@ -536,8 +537,10 @@ class Following:
                 f"positions]). State them, or read {least} samples ahead or more: lead = "
                 f"{round(0.75 * period)}."
             )
-        channels = [*names, alignment.settings.surge_channel]
-        tables = [labelled.sound_matrix(run, channels, name) for name, run in windows.items()]
+        surge = alignment.settings.surge_channel
+        tables = [labelled.sound_matrix(run, [*names, surge], n) for n, run in windows.items()]
+        for name, run in windows.items():
+            labelled.check_units(run, surge, "m", name)
         records, surges = [each[:, :-1] for each in tables], [each[:, -1] for each in tables]
         highest = alignment.highest_frequency
         omega, power = mean_spectrum(
@@ -558,14 +561,14 @@ class Following:
         spacing = 2 * np.pi / peak / PER_WAVE
         places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
         if places > MOST_PLACES:
-            surge, far = alignment.settings.surge_channel, high - low
+            far = high - low
             raise DataError(
                 f"{surge} moves over {far:.4g} m in training, {far / PER_WAVE / spacing:.0f} "
                 f"wavelengths. Check that '{surge}' is in metres, or set alignment surge = 'none'."
             )
         return cls(
             alignment=alignment,
-            column=list(states).index(alignment.settings.surge_channel),
+            column=list(states).index(surge),
             dt=dt,
             ahead=look_ahead,
             lead=max(look_ahead, least),

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, Groups
-from seakeep.conventions import is_elevation
+from seakeep.conventions import conversion, is_elevation
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
@@ -115,8 +115,10 @@ def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float
     Raises
     ------
     DataError
-        If the times are not numbers, unsorted, repeated or not uniform, or the step is another.
+        If the times are not numbers or not in seconds, unsorted, repeated or not uniform, or the
+        step is another.
     """
+    check_units(run, "time", "s", name)
     step = uniform_step(run.variables["time"].values, name)
     if expected is not None and abs(step - expected) > 1e-4 * expected:
         raise DataError(
@@ -124,6 +126,17 @@ def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float
             "Resample the run (seakeep.signals.resample, or the campaign's [preparation])."
         )
     return step
+
+
+def check_units(run: xr.Dataset, channel: str, expected: str, name: str) -> None:
+    """Refuse a channel that states another unit than the one expected, however it is spelt."""
+    stated, called = run.variables[channel].attrs.get("units", ""), f"'{channel}' of {name}"
+    units = str(stated).partition(" since ")[0]
+    if units not in ("", expected) and conversion(units, expected, called) != 1.0:
+        raise DataError(
+            f"{called} is in '{units}'; '{expected}' is expected. Convert it and its units "
+            "attribute."
+        )
 
 
 def opened(
@@ -206,9 +219,11 @@ def check_channels(run: xr.Dataset, names: Sequence[str], name: str) -> list[xr.
             )
         variable = variables[channel]
         if variable.dims != ("time",):
+            is_flat = run[channel].squeeze().dims == ("time",)
+            remedy = "Take run.squeeze()" if is_flat else "Give each channel its own variable"
             raise DataError(
                 f"channel '{channel}' of {name} has the dimensions {variable.dims} and shape "
-                f"{variable.shape}; ('time',) is expected. Give each channel its own variable."
+                f"{variable.shape}; ('time',) is expected. {remedy}."
             )
         if variable.dtype.kind not in "iufb":
             raise DataError(
