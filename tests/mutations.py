@@ -386,7 +386,10 @@ CHANGES = {
         ("squared = (here - place.centre) ** 2", "squared = here**2", "models/test_following.py::test_training_is_the_recursion_on_the_measured_surge"),
     ],
     "models/labelled.py": [
-        ("*filter(is_elevation, inputs), *lengths", "*inputs", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),
+        ("if is_elevation(each) or is_probe(each)", "if True", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),
+        ("if is_elevation(each) or is_probe(each)", "if is_elevation(each)", "models/test_selection.py::test_observables_are_those_of_elevations_of_any_name"),
+        ("min(waves or lengths, key=", "max(waves or lengths, key=", "models/test_selection.py::test_periods_are_those_of_the_elevation_farthest_up_wave"),
+        ('check_units(run, "time", "s", name)', "pass", "models/test_bad_input.py::test_times_that_state_another_unit_than_seconds_are_refused"),
     ],
     "models/linear.py": [
         ("-poles.real / natural", "-poles.real / frequency", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),

@@ -217,7 +217,7 @@ class ProbeAlignment:
             settings=self,
             inputs=tuple(inputs),
             carried=carried,
-            positions=tuple(_position(first, channel) for channel in inputs),
+            positions=tuple(labelled.position(first, channel) for channel in inputs),
             celerity=celerity,
             water_depth=depth,
             highest_frequency=limit,
@@ -241,7 +241,9 @@ class ProbeAlignment:
         name, first = next(iter(runs.items()))
         if self.surge == "predicted" and self.surge_channel not in states:
             return f"'{self.surge_channel}' is not among the states"
-        placed = self.channels or [each for each in inputs if _position(first, each) is not None]
+        placed = self.channels or [
+            each for each in inputs if labelled.position(first, each) is not None
+        ]
         if not placed and self.surge != "none":
             return f"{name} states no position of a wave probe"
         if not placed and not any(is_elevation(each, rates=True) for each in inputs):
@@ -353,7 +355,7 @@ class FittedAlignment:
     def rig(self, run: xr.Dataset | None = None) -> Rig:
         """Offsets, positions and depth of a run; what it does not state is as in training."""
         attrs = {} if run is None else run.attrs
-        stated = [None if run is None else _position(run, each) for each in self.inputs]
+        stated = [None if run is None else labelled.position(run, each) for each in self.inputs]
         places = tuple(
             trained if here is None else here
             for here, trained in zip(stated, self.positions, strict=True)
@@ -421,7 +423,7 @@ def _elevations(
             )
         chosen = tuple(channel in settings.channels for channel in inputs)
     else:
-        chosen = tuple(_position(run, channel) is not None for channel in inputs)
+        chosen = tuple(labelled.position(run, channel) is not None for channel in inputs)
         if not any(chosen):
             chosen = tuple(is_elevation(channel, rates=True) for channel in inputs)
     if not any(chosen):
@@ -431,11 +433,6 @@ def _elevations(
             "campaign), or name them: alignment channels = ['…']."
         )
     return chosen
-
-
-def _position(run: xr.Dataset, channel: str) -> float | None:
-    value = run[channel].attrs.get("x_position")
-    return None if value is None else float(value)
 
 
 def _common_depth(runs: Datasets) -> float | None:
@@ -451,7 +448,7 @@ def _celerity(runs: Datasets, elevations: Sequence[str], depth: float | None) ->
         if "celerity" in run.attrs:
             slowness.append(1.0 / float(run.attrs["celerity"]))
             continue
-        placed = {c: x for c in elevations if (x := _position(run, c)) is not None}
+        placed = {c: x for c in elevations if (x := labelled.position(run, c)) is not None}
         if len(set(placed.values())) < 2 or depth is None:
             raise RequestError(
                 f"alignment: the celerity cannot be estimated from {name}: it takes the water "
