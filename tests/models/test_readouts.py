@@ -88,6 +88,21 @@ def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
     assert "(NRMSE on held-out runs: none 0." in summary
 
 
+def test_a_load_in_kilonewtons_is_read_off_as_one_in_newtons(chosen, runs, drift):
+    def in_kn(run):
+        return run.assign(mooring_bow=(run["mooring_bow"] / 1000).assign_attrs(units="kN"))
+
+    model = replace(SPEC, readouts="auto").fit(
+        {name: in_kn(run) for name, run in runs.items()}, STATES, INPUTS
+    )
+    found, expected = (
+        each.forecast(run, START, STEPS)["mooring_bow"]
+        for each, run in ((model, in_kn(drift)), (chosen, drift))
+    )
+    # Values are standardised, so that units leave rounding alone.
+    assert_allclose(1000 * found, expected, rtol=0, atol=1e-6 * float(expected.std()))
+
+
 def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
     dry = {}
     for seed, (name, run) in enumerate(runs.items()):
