@@ -371,6 +371,8 @@ CHANGES = {
         ("np.fmin(np.abs(mean - centre), before)", "np.abs(mean - centre)", "models/test_ahead.py::test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises"),
         ("np.clip(trust, 0.0, 1.0)", "np.clip(trust, 1.0, 1.0)", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
         ("np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)", "np.clip(trust, 0.0, 1.0)", "models/test_ahead.py::test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises"),
+        ("if drifts else", "if True else", "models/test_following.py::test_who_drifts_no_farther_than_in_training_is_to_read_further_ahead"),
+        ("if drifts else", "if False else", "models/test_following.py::test_who_drifts_no_farther_than_in_training_is_to_read_further_ahead"),
         ("whole |= not whole.any()", "pass", "models/test_ahead.py::test_a_run_that_is_lost_at_last_is_weighed_before"),
         ("np.nan_to_num((high - claimed) / (high - low), nan=0.0)", "(high - claimed) / (high - low)", "models/test_ahead.py::test_a_run_that_is_lost_at_last_is_weighed_before"),
         ("own.part(at), steps < first, ", "own.part(at), steps < 0, ", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),

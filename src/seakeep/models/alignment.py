@@ -675,7 +675,7 @@ class Following:
         )
 
     @property
-    def _known(self) -> slice:
+    def trained(self) -> slice:
         """Places of the grid that training reached."""
         margin = BEYOND / (1 + 2 * BEYOND) * (self.place.count - 2)
         return slice(int(margin), self.place.count - int(margin))
@@ -689,7 +689,7 @@ class Following:
     def describe(self) -> list[str]:
         """Lines of a summary."""
         (low, high), banks = self.reach, self.banks(None)
-        known = np.max([bank.errors[self._known] for bank in banks], axis=0)
+        known = np.max([bank.errors[self.trained] for bank in banks], axis=0)
         return [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
             f"    carriers    {self.back * self.dt:.3g} s back and {self.ahead * self.dt:.3g} s "
@@ -711,7 +711,7 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
         taps, errors = following._carriers(
             rig, columns, targets, following.ahead, np.full(len(targets), following.lead)
         )
-        if errors[following._known].min() > REACH:
+        if errors[following.trained].min() > REACH:
             raise RequestError(
                 f"the probe of '{aligned.inputs[column]}' stands {rig.offsets[column]:+.3g} m from "
                 "where it stood in training, too far for carriers of "
