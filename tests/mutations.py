@@ -293,6 +293,8 @@ CHANGES = {
         ("(error / square - apart / variance)", "(error / square)", "test_metrics.py::test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says"),
     ],
     "models/alignment.py": [
+        ('labelled.check_units(run, settings.surge_channel, "m", name)', "pass", "models/test_alignment.py::test_a_measured_surge_in_other_units_than_metres_is_refused"),
+        ('labelled.check_units(run, surge, "m", name)', "pass", "models/test_following.py::test_a_surge_in_other_units_than_metres_is_refused"),
         ("carrier.at(surge[read] + offset,", "carrier.at(offset - surge[read],", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
         ("float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
@@ -375,6 +377,8 @@ CHANGES = {
         ("np.fmin(np.abs(mean - centre), before)", "np.abs(mean - centre)", "models/test_ahead.py::test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises"),
         ("np.clip(trust, 0.0, 1.0)", "np.clip(trust, 1.0, 1.0)", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
         ("np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)", "np.clip(trust, 0.0, 1.0)", "models/test_ahead.py::test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises"),
+        ("if drifts else", "if True else", "models/test_following.py::test_who_drifts_no_farther_than_in_training_is_to_read_further_ahead"),
+        ("if drifts else", "if False else", "models/test_following.py::test_who_drifts_no_farther_than_in_training_is_to_read_further_ahead"),
         ("whole |= not whole.any()", "pass", "models/test_ahead.py::test_a_run_that_is_lost_at_last_is_weighed_before"),
         ("np.nan_to_num((high - claimed) / (high - low), nan=0.0)", "(high - claimed) / (high - low)", "models/test_ahead.py::test_a_run_that_is_lost_at_last_is_weighed_before"),
         ("own.part(at), steps < first, ", "own.part(at), steps < 0, ", "models/test_ahead.py::test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone"),
@@ -390,7 +394,10 @@ CHANGES = {
         ("squared = (here - place.centre) ** 2", "squared = here**2", "models/test_following.py::test_training_is_the_recursion_on_the_measured_surge"),
     ],
     "models/labelled.py": [
-        ("*filter(is_elevation, inputs), *lengths", "*inputs", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),
+        ("if is_elevation(each) or is_probe(each)", "if True", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),
+        ("if is_elevation(each) or is_probe(each)", "if is_elevation(each)", "models/test_selection.py::test_observables_are_those_of_elevations_of_any_name"),
+        ("min(waves or lengths, key=", "max(waves or lengths, key=", "models/test_selection.py::test_periods_are_those_of_the_elevation_farthest_up_wave"),
+        ('check_units(run, "time", "s", name)', "pass", "models/test_bad_input.py::test_times_that_state_another_unit_than_seconds_are_refused"),
     ],
     "models/linear.py": [
         ("-poles.real / natural", "-poles.real / frequency", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
@@ -439,6 +446,7 @@ CHANGES = {
         ("return outside | Validity.CONSISTENCY if alarm else outside", "return outside", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
     ],
     "models/loads.py": [
+        ("(REACH * lengths + np.arange", "(0 * lengths + np.arange", "models/test_readouts.py::test_a_line_is_sought_about_the_vessel_wherever_its_surge_counts_from"),
         ("if not signature.input_map.reference:", "if True:", "models/test_readouts.py::test_a_floor_is_never_undercut_and_a_taut_line_has_none"),
     ],
     "models/observables.py": [

@@ -41,6 +41,18 @@ def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models, dr
 
 
 @pytest.mark.parametrize("key", ["effective", "dispersion"])
+def test_a_measured_surge_in_other_units_than_metres_is_refused(models, drifts, key):
+    """Also where it is no state, whose unit the model knows."""
+    in_mm = [run.assign(surge=(1000 * run["surge"]).assign_attrs(units="mm")) for run in drifts]
+    model = models[key].settings.fit(drifts, ["heave"], INPUTS)
+    message = r"'surge' of run is in 'mm'; 'm' is expected\. Convert it and its units attribute\."
+    with data_error(message):
+        model.settings.fit(in_mm, ["heave"], INPUTS)
+    with data_error(message):
+        model.forecast(in_mm[0], start=60.0, steps=10)
+
+
+@pytest.mark.parametrize("key", ["effective", "dispersion"])
 def test_elevations_are_carried_where_a_span_reads_them_alone(models, drift, key):
     found = models[key].alignment.carry(drift, [Span(300, 300, 400), Span(600, 600, 650)])
     read = np.flatnonzero(np.isfinite(found).all(axis=1))

@@ -27,6 +27,27 @@ def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run):
         model.forecast(bad, start=5.0, steps=5)
 
 
+def test_times_that_state_another_unit_than_seconds_are_refused(model, run):
+    run["time"].attrs["units"] = "ms"
+    message = r"'time' of run is in 'ms'; 's' is expected\. Convert it and its units attribute\."
+    with data_error(message):
+        fit(run)
+    with data_error(message):
+        model.forecast(run.assign_attrs(run="run"), start=5.0, steps=5)
+    for spelt in ("s", "sec", "seconds since 2024-05-03"):
+        run["time"].attrs["units"] = spelt
+        assert fit(run).dt == model.dt
+
+
+def test_a_dimension_of_length_one_is_to_be_squeezed(model, run):
+    case = run.expand_dims("case")
+    with data_error(r"\('case', 'time'\) and shape \(1, 400\); .* Take run\.squeeze\(\)\."):
+        fit(case)
+    np.testing.assert_array_equal(fit(case.squeeze()).A, model.A)
+    with data_error(r"shape \(2, 400\); .* Give each channel its own variable\."):
+        fit(xr.concat([case, case], "case"))
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("name", ["heave", "eta_cog"])
 def test_gaps_in_the_window_are_refused(run, name, value):

@@ -7,6 +7,7 @@ import pytest
 from drifting import FOLLOWED, INPUTS, OBSERVABLES, STATES, heave_error
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
+from said import warned
 
 from seakeep import HankelDMDc
 from seakeep.core.recursion import Place, Recursion, recursion
@@ -57,6 +58,9 @@ def test_a_surge_in_other_units_than_metres_is_refused(drifts):
         match=r" 1200 m in training, 2[0-9]{2} wavelengths\. Check that 'surge' is in metres",
     ):
         SPEC.fit(far, STATES, INPUTS)
+    stated = [run.assign(surge=run["surge"].assign_attrs(units="cm")) for run in drifts]
+    with pytest.raises(DataError, match=r"'surge' of run is in 'cm'; 'm' is expected\. Convert"):
+        SPEC.fit(stated, STATES, INPUTS)
 
 
 def test_a_ridge_weighs_a_hundred_times_on_powers(models):
@@ -122,3 +126,20 @@ def test_a_step_is_the_equation():
         one, driven = run(of, slice(1), lost)
         assert_array_equal(np.isnan(one), np.isnan(lost[of, :1]))
         assert np.isfinite(driven).all()
+
+
+def test_who_drifts_no_farther_than_in_training_is_to_read_further_ahead(drifts, drift):
+    def away(run, by):
+        return run.assign(surge=(run["surge"] + by).assign_attrs(units="m"))
+
+    # Training goes to −1.9 m; without a look-ahead carriers know the waves to −1.5 m.
+    spec = replace(SPEC, lead=0, observables=())
+    model = spec.fit([away(run, -1.3) for run in drifts], STATES, INPUTS)
+    with warned(
+        r"lies beyond -1\.\d+ to .* m, where the carriers know .* waves\. Read further ahead"
+    ):
+        model.forecast(away(drift, -1.3), start=60.0, steps=300)
+    with warned(
+        r"know the waves\. Train on runs that drift as far, read further ahead \(lead\), or"
+    ):
+        model.forecast(away(drift, -4.0), start=60.0, steps=300)

@@ -89,6 +89,35 @@ def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
     assert "(NRMSE on held-out runs: none 0." in summary
 
 
+def test_a_line_is_sought_about_the_vessel_wherever_its_surge_counts_from(chosen, runs, drift):
+    spec = replace(SPEC, readouts="auto", alignment=replace(FOLLOWED, offset=-20.0))
+
+    def away(run):
+        return run.assign(surge=(run["surge"] + 20.0).assign_attrs(units="m"))
+
+    model = spec.fit({name: away(run) for name, run in runs.items()}, STATES, INPUTS)
+    (line,) = model.signature.readouts
+    # Places that are tried are others, up to half of their step.
+    step = 2 * model.signature.input_map.follows.place.spacing
+    assert abs(line.load.place - 20.0 - LINE) <= step
+    assert error(model, away(drift)) < 1.2 * error(chosen, drift)
+
+
+def test_a_load_in_kilonewtons_is_read_off_as_one_in_newtons(chosen, runs, drift):
+    def in_kn(run):
+        return run.assign(mooring_bow=(run["mooring_bow"] / 1000).assign_attrs(units="kN"))
+
+    model = replace(SPEC, readouts="auto").fit(
+        {name: in_kn(run) for name, run in runs.items()}, STATES, INPUTS
+    )
+    found, expected = (
+        each.forecast(run, START, STEPS)["mooring_bow"]
+        for each, run in ((model, in_kn(drift)), (chosen, drift))
+    )
+    # Values are standardised, so that units leave rounding alone.
+    assert_allclose(1000 * found, expected, rtol=0, atol=1e-6 * float(expected.std()))
+
+
 def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
     dry = {}
     for seed, (name, run) in enumerate(runs.items()):

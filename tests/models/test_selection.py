@@ -18,7 +18,7 @@ from squared import DT, INPUTS, STATES, runs
 
 from seakeep import HankelDMDc, ProbeAlignment, Select
 from seakeep.models.candidates import default_observables
-from seakeep.models.labelled import mean_period
+from seakeep.models.labelled import elevations, mean_period
 from seakeep.models.selection import RIDGES, Problem, groups_of, select
 
 SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
@@ -99,6 +99,34 @@ def test_periods_are_counted_in_the_first_elevation():
     assert mean_period({"still": still, "b": stated}, [*periods]) == pytest.approx(15)
     with data_error(r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
         mean_period({"a": run}, ["wind"])
+
+
+@pytest.mark.parametrize("order", [slice(None), slice(None, None, -1)])
+def test_periods_are_those_of_the_elevation_farthest_up_wave(order):
+    """A free name is an elevation where its channel states a position and metres."""
+    periods = {"eta_fwd": 2, "wave": 2.5, "gauge": 3, "pressure": 4}
+    angles = 2 * np.pi * DT * np.arange(600)
+    run = record(DT, **{name: np.sin(angles / period) for name, period in periods.items()})
+    run["pressure"].attrs.update(units="Pa", x_position=-9.0)
+    run["eta_fwd"].attrs["x_position"] = 1.0
+    names = [*periods][order]
+    assert mean_period({"a": run}, names) == pytest.approx(2 / DT, rel=1e-3)
+    run["wave"].attrs["x_position"] = -1.0
+    assert mean_period({"a": run}, names) == pytest.approx(2.5 / DT, rel=1e-3)
+    assert {*elevations(run, names, "a")} == {"eta_fwd", "wave"}
+
+
+def test_observables_are_those_of_elevations_of_any_name():
+    spec = replace(SPEC, ridge=1e-3, ridge_scale="per_snapshot", select=Select(observables=True))
+    found = []
+    for name in ("eta", "wave"):
+        given = {key: run.rename(eta=name) for key, run in runs().items()}
+        for run in given.values():
+            run[name].attrs["x_position"] = 0.0
+        found.append(spec.fit(given, STATES, [name]))
+    first, other = (each.settings.observables for each in found)
+    assert [each.kind for each in other] == [each.kind for each in first] != []
+    assert_array_equal(found[0].A, found[1].A)
 
 
 def test_runs_that_repeat_the_wave_are_one_group_whatever_stands_first():

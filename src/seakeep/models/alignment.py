@@ -217,7 +217,7 @@ class ProbeAlignment:
             settings=self,
             inputs=tuple(inputs),
             carried=carried,
-            positions=tuple(_position(first, channel) for channel in inputs),
+            positions=tuple(labelled.position(first, channel) for channel in inputs),
             celerity=celerity,
             water_depth=depth,
             highest_frequency=limit,
@@ -241,7 +241,9 @@ class ProbeAlignment:
         name, first = next(iter(runs.items()))
         if self.surge == "predicted" and self.surge_channel not in states:
             return f"'{self.surge_channel}' is not among the states"
-        placed = self.channels or [each for each in inputs if _position(first, each) is not None]
+        placed = self.channels or [
+            each for each in inputs if labelled.position(first, each) is not None
+        ]
         if not placed and self.surge != "none":
             return f"{name} states no position of a wave probe"
         if not placed and not any(is_elevation(each, rates=True) for each in inputs):
@@ -353,7 +355,7 @@ class FittedAlignment:
     def rig(self, run: xr.Dataset | None = None) -> Rig:
         """Offsets, positions and depth of a run; what it does not state is as in training."""
         attrs = {} if run is None else run.attrs
-        stated = [None if run is None else _position(run, each) for each in self.inputs]
+        stated = [None if run is None else labelled.position(run, each) for each in self.inputs]
         places = tuple(
             trained if here is None else here
             for here, trained in zip(stated, self.positions, strict=True)
@@ -387,6 +389,7 @@ class FittedAlignment:
         if settings.surge != "none":  # read where it is allowed, and no further
             channel = [settings.surge_channel]
             surge = labelled.channel_matrix(run, channel, name)[:last, 0]
+            labelled.check_units(run, settings.surge_channel, "m", name)
             for span in spans:
                 known = surge[span.first : span.stop, None]
                 labelled.check_finite(known, channel, run, name, span.first)
@@ -420,7 +423,7 @@ def _elevations(
             )
         chosen = tuple(channel in settings.channels for channel in inputs)
     else:
-        chosen = tuple(_position(run, channel) is not None for channel in inputs)
+        chosen = tuple(labelled.position(run, channel) is not None for channel in inputs)
         if not any(chosen):
             chosen = tuple(is_elevation(channel, rates=True) for channel in inputs)
     if not any(chosen):
@@ -430,11 +433,6 @@ def _elevations(
             "campaign), or name them: alignment channels = ['…']."
         )
     return chosen
-
-
-def _position(run: xr.Dataset, channel: str) -> float | None:
-    value = run[channel].attrs.get("x_position")
-    return None if value is None else float(value)
 
 
 def _common_depth(runs: Datasets) -> float | None:
@@ -450,7 +448,7 @@ def _celerity(runs: Datasets, elevations: Sequence[str], depth: float | None) ->
         if "celerity" in run.attrs:
             slowness.append(1.0 / float(run.attrs["celerity"]))
             continue
-        placed = {c: x for c in elevations if (x := _position(run, c)) is not None}
+        placed = {c: x for c in elevations if (x := labelled.position(run, c)) is not None}
         if len(set(placed.values())) < 2 or depth is None:
             raise RequestError(
                 f"alignment: the celerity cannot be estimated from {name}: it takes the water "
@@ -536,8 +534,10 @@ class Following:
                 f"positions]). State them, or read {least} samples ahead or more: lead = "
                 f"{round(0.75 * period)}."
             )
-        channels = [*names, alignment.settings.surge_channel]
-        tables = [labelled.sound_matrix(run, channels, name) for name, run in windows.items()]
+        surge = alignment.settings.surge_channel
+        tables = [labelled.sound_matrix(run, [*names, surge], n) for n, run in windows.items()]
+        for name, run in windows.items():
+            labelled.check_units(run, surge, "m", name)
         records, surges = [each[:, :-1] for each in tables], [each[:, -1] for each in tables]
         highest = alignment.highest_frequency
         omega, power = mean_spectrum(
@@ -558,14 +558,14 @@ class Following:
         spacing = 2 * np.pi / peak / PER_WAVE
         places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
         if places > MOST_PLACES:
-            surge, far = alignment.settings.surge_channel, high - low
+            far = high - low
             raise DataError(
                 f"{surge} moves over {far:.4g} m in training, {far / PER_WAVE / spacing:.0f} "
                 f"wavelengths. Check that '{surge}' is in metres, or set alignment surge = 'none'."
             )
         return cls(
             alignment=alignment,
-            column=list(states).index(alignment.settings.surge_channel),
+            column=list(states).index(surge),
             dt=dt,
             ahead=look_ahead,
             lead=max(look_ahead, least),
@@ -675,7 +675,7 @@ class Following:
         )
 
     @property
-    def _known(self) -> slice:
+    def trained(self) -> slice:
         """Places of the grid that training reached."""
         margin = BEYOND / (1 + 2 * BEYOND) * (self.place.count - 2)
         return slice(int(margin), self.place.count - int(margin))
@@ -689,7 +689,7 @@ class Following:
     def describe(self) -> list[str]:
         """Lines of a summary."""
         (low, high), banks = self.reach, self.banks(None)
-        known = np.max([bank.errors[self._known] for bank in banks], axis=0)
+        known = np.max([bank.errors[self.trained] for bank in banks], axis=0)
         return [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
             f"    carriers    {self.back * self.dt:.3g} s back and {self.ahead * self.dt:.3g} s "
@@ -711,7 +711,7 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
         taps, errors = following._carriers(
             rig, columns, targets, following.ahead, np.full(len(targets), following.lead)
         )
-        if errors[following._known].min() > REACH:
+        if errors[following.trained].min() > REACH:
             raise RequestError(
                 f"the probe of '{aligned.inputs[column]}' stands {rig.offsets[column]:+.3g} m from "
                 "where it stood in training, too far for carriers of "

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from seakeep.arrays import Datasets
-from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
+from seakeep.models import labelled
 from seakeep.models.alignment import LEAD, FittedAlignment, ProbeAlignment
 from seakeep.models.observables import Powers, SlowSquares
 from seakeep.models.settings import HankelSettings
@@ -160,7 +160,9 @@ class Candidates:
         if self.base.observables or "observables" not in {*self.vary, *self.opened}:
             return self.base.observables
         ahead = int(candidate.lead) if candidate.follows_surge else None
-        every = default_observables(self.given[2], self.period * self.step, self.unseen, ahead)
+        (name, run), *_ = self.given[0].items()
+        waves = labelled.elevations(run, self.given[2], name)
+        every = default_observables(waves, self.period * self.step, self.unseen, ahead)
         if self._is_without(candidate):
             every = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in every)
         return every[self.cut :]
@@ -197,7 +199,7 @@ class Candidates:
 
 
 def default_observables(
-    inputs: Sequence[str],
+    elevations: tuple[str, ...],
     period: float | None = None,
     unseen: bool = False,
     follows: int | None = None,
@@ -211,7 +213,6 @@ def default_observables(
     looks so many samples ahead takes a filter of one period that reads no further than its waves;
     without a look-ahead the squares of all elevations, of which those up-wave tell what comes.
     """
-    elevations = tuple(name for name in inputs if is_elevation(name))
     if not elevations:
         return ()
     at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations

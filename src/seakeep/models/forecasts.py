@@ -427,10 +427,13 @@ def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -
     beyond = np.flatnonzero((places <= low) | (places >= high))
     if beyond.size:
         instant = instant_text(windows.time[0].values[beyond[0]], signature.dt)
+        trained, far = follows.place.grid[follows.trained], places[beyond]
+        drifts = far.min() < trained[0] or far.max() > trained[-1]
+        longer = "Train on runs that drift as far, read" if drifts else "Read"
         warn(
             f"{windows.places[0][0]}: from t = {instant} s on the slow surge of the forecast lies "
-            f"beyond {low:.3g} to {high:.3g} m, where the carriers know the waves. Train on runs "
-            "that drift as far, read further ahead (lead), or add a probe up-wave."
+            f"beyond {low:.3g} to {high:.3g} m, where the carriers know the waves. {longer} "
+            "further ahead (lead), or add a probe up-wave."
         )
 
 

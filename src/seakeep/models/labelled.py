@@ -1,5 +1,6 @@
 """The thin layer between labelled runs and arrays: Datasets in, arrays out, and back."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, Groups
-from seakeep.conventions import is_elevation
+from seakeep.conventions import canonical_channel, conversion, is_elevation
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
@@ -116,8 +117,10 @@ def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float
     Raises
     ------
     DataError
-        If the times are not numbers, unsorted, repeated or not uniform, or the step is another.
+        If the times are not numbers or not in seconds, unsorted, repeated or not uniform, or the
+        step is another.
     """
+    check_units(run, "time", "s", name)
     step = uniform_step(run.variables["time"].values, name)
     if expected is not None and abs(step - expected) > 1e-4 * expected:
         raise DataError(
@@ -125,6 +128,17 @@ def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float
             "Resample the run (seakeep.signals.resample, or the campaign's [preparation])."
         )
     return step
+
+
+def check_units(run: xr.Dataset, channel: str, expected: str, name: str) -> None:
+    """Refuse a channel that states another unit than the one expected, however it is spelt."""
+    stated, called = run.variables[channel].attrs.get("units", ""), f"'{channel}' of {name}"
+    units = str(stated).partition(" since ")[0]
+    if units not in ("", expected) and conversion(units, expected, called) != 1.0:
+        raise DataError(
+            f"{called} is in '{units}'; '{expected}' is expected. Convert it and its units "
+            "attribute."
+        )
 
 
 def opened(
@@ -207,9 +221,11 @@ def check_channels(run: xr.Dataset, names: Sequence[str], name: str) -> list[xr.
             )
         variable = variables[channel]
         if variable.dims != ("time",):
+            is_flat = run[channel].squeeze().dims == ("time",)
+            remedy = "Take run.squeeze()" if is_flat else "Give each channel its own variable"
             raise DataError(
                 f"channel '{channel}' of {name} has the dimensions {variable.dims} and shape "
-                f"{variable.shape}; ('time',) is expected. Give each channel its own variable."
+                f"{variable.shape}; ('time',) is expected. {remedy}."
             )
         if variable.dtype.kind not in "iufb":
             raise DataError(
@@ -340,13 +356,37 @@ def nearest_sample(time: FloatArray, value: object, name: str, what: str = "star
 def wave_channel(run: xr.Dataset, inputs: Sequence[str], name: str) -> str | None:
     """The input that tells of the waves of a run, which messages call `name`.
 
-    The first that is named as a wave elevation, else the first that has no unit or metres; None
-    where there is neither.
+    Of the elevations, or else of the inputs that have no unit or metres, that farthest up-wave; the
+    first where no position is stated; None where there is none.
     """
-    variables = check_channels(run, inputs, name)
-    units = [variable.attrs.get("units", "") for variable in variables]
-    lengths = [each for each, unit in zip(inputs, units, strict=True) if unit in ("", "m")]
-    return next(iter([*filter(is_elevation, inputs), *lengths]), None)
+
+    def place(channel: str) -> float:
+        return math.inf if (at := position(run, channel)) is None else at
+
+    waves = elevations(run, inputs, name)
+    lengths = [each for each in inputs if _is_length(run, each)]
+    return min(waves or lengths, key=place, default=None)
+
+
+def elevations(run: xr.Dataset, inputs: Sequence[str], name: str) -> tuple[str, ...]:
+    """Inputs that are wave elevations: by their names, free names by their positions and unit."""
+    check_channels(run, inputs, name)
+
+    def is_probe(channel: str) -> bool:
+        placed = position(run, channel) is not None and _is_length(run, channel)
+        return placed and canonical_channel(channel) is None
+
+    return tuple(each for each in inputs if is_elevation(each) or is_probe(each))
+
+
+def position(run: xr.Dataset, channel: str) -> float | None:
+    """Position of a probe, m, as its channel states it."""
+    value = run.variables[channel].attrs.get("x_position")
+    return None if value is None else float(value)
+
+
+def _is_length(run: xr.Dataset, channel: str) -> bool:
+    return run.variables[channel].attrs.get("units", "") in ("", "m")
 
 
 def last_samples(runs: Datasets, window: int | None) -> Groups:

@@ -82,9 +82,13 @@ def fit_readouts(
     seen = np.concatenate([values[window.samples] for values, window in windows])
     follows, out = signature.input_map.follows, []
     judged = [] if follows is None else [*held]
-    spacing = 0.0 if follows is None else follows.place.spacing
-    places: FloatArray = STEP * spacing * np.arange(-REACH, REACH + 1.0)
-    waves = [_waves(data, runs, number, places) for number in range(len(states) * bool(follows))]
+    places, waves = np.zeros(0), []
+    if follows is not None:
+        step = STEP * follows.place.spacing
+        # About the probe, or whole lengths of the wave from it where the vessel is.
+        lengths = round(follows.place.centre / step / REACH)
+        places = step * (REACH * lengths + np.arange(-REACH, REACH + 1.0))
+        waves = [_waves(data, runs, number, places) for number in range(len(states))]
     for channel, asked in readouts.items():
         column = signature.states.index(channel)
         columns = motions_of(signature.state_labels, channel)

@@ -293,8 +293,8 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
         wave leave the range of training, the forecast of the channel as a state takes over.
         ``"wave"`` does so; ``"auto"`` where that forecasts training runs that are held out better,
         by more than two standard errors of the gain and 2 % of the error. Alone, "auto" holds for
-        every load among the states (in N). A channel that rests on a floor in a hundredth of the
-        training samples or more is not forecast below their 0.002 quantile, with either.
+        every load among the states (in N, kN or MN). A channel that rests on a floor in a hundredth
+        of the training samples or more is not forecast below their 0.002 quantile, with either.
     memory : int or str, optional
         Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
         means over blocks of delays that double in length are further regressors. It takes exact
