@@ -115,7 +115,7 @@ def test_a_load_in_kilonewtons_is_read_off_as_one_in_newtons(chosen, runs, drift
         for each, run in ((model, in_kn(drift)), (chosen, drift))
     )
     # Values are standardised, so that units leave rounding alone.
-    assert_allclose(1000 * found, expected, rtol=0, atol=1e-6 * float(expected.std()))
+    assert_near(1000 * found, expected, 1e-6 * float(expected.std()))
 
 
 def test_auto_leaves_a_linear_load_as_it_is(runs, drift):

@@ -82,7 +82,7 @@ def statistics(
     parts, units = [], units_of(model, model.states)
     for column, state in enumerate(model.states):
         noise = [waves[name][state].attrs.get("noise_std", 0.0) for name in known]
-        laws, known_below = [], np.nan if units[column] == "N" else 1.0
+        laws, known_below = [], np.nan if units[column].endswith("N") else 1.0
         for of_kind in moved.values():
             above, below = (
                 _law([side * x[:, column] for x in of_kind], noise, model.dt, duration)

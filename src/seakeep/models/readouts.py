@@ -123,7 +123,7 @@ def motions_of(states: Sequence[ChannelLabel], channel: str) -> list[int]:
 def readouts_asked(readouts: ReadOuts, states: Sequence[ChannelLabel]) -> dict[str, Asked]:
     """Kinds by channel of a model with these states; refuses those of what is no state."""
     if isinstance(readouts, str):
-        loads = [label.name for label in states if label.units in ("N", "kN", "MN")]
+        loads = [label.name for label in states if label.units.endswith("N")]
         return dict.fromkeys(loads if motions_of(states, "") else [], "auto")
     names = [label.name for label in states]
     for channel, _ in readouts:
