@@ -318,6 +318,7 @@ CHANGES = {
         ("[self._fitting(best, **{name: length})", "[replace(best, **{name: length})", "models/test_choice.py::test_a_look_ahead_that_is_left_open_may_be_varied_too"),
     ],
     "models/conditions.py": [
+        ("if self.channel in DRIFTING or", "if", "models/test_conditions.py::test_an_offset_of_what_is_moored_may_be_drift"),
         ("reason = _input(others, runs[odd])", "reason = {}", "models/test_conditions.py::test_an_input_in_whose_range_no_other_run_lies_is_named_first"),
         ("gains.sum() + mean >= least", "gains.sum() >= least", "models/test_conditions.py::test_another_unit_of_a_load_moves_its_mean_too"),
         ("window=None, memory=0)", "window=None)", "models/test_conditions.py::test_an_offset_is_named_also_for_a_model_with_a_memory"),
