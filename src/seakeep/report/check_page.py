@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from seakeep.check import Checked
-from seakeep.conventions import displayed, is_elevation
+from seakeep.conventions import is_elevation
 from seakeep.report.figures import checks
 from seakeep.report.page import Section, drawing, section
-from seakeep.report.style import shown_unit
+from seakeep.report.style import prefixed, shown_unit
 from seakeep.report.tables import (
     MISSING,
     WORDS,
@@ -195,7 +195,8 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
-    factors, units = zip(*map(displayed, result["units"].values), strict=True)
+    values = result[[*keys]].to_array().transpose("state", ...).values
+    factors, units = zip(*map(prefixed, result["units"].values, values), strict=True)
     names = [
         f"{state} [{shown_unit(unit)}]"
         for state, unit in zip(result["state"].values, units, strict=True)
