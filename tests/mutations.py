@@ -527,6 +527,7 @@ CHANGES = {
         ("key: one[key].values for", "key: one[keys[0]].values for", "report/test_page.py::test_cells_of_the_time_histories_are_the_forecasts_in_degrees"),
     ],
     "report/check_page.py": [
+        ("modes.head(mode=SLOWEST)", "modes", "report/test_check_page.py::test_a_motion_that_swings_farther_than_it_was_moved_is_named"),
         ('or at["trough_chance"] < RARE', "", "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
         ('if at["extreme_chance"] < RARE or', "if", "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),
         ('{*result["input"].values} - {"wave"}', '{"wave"}', "report/test_check_page.py::test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told"),

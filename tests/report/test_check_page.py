@@ -73,10 +73,12 @@ def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
         coords={"motion": ["heave", "pitch"], "time": np.arange(4.0)},
     )
     keys = ("period", "damping_ratio", "decay_time", "modulus")
-    slow = xr.Dataset({key: ("mode", [1.0]) for key in keys})
-    slow["participation"] = (("mode", "state"), [[1.0]])
+    slow = xr.Dataset({key: ("mode", np.arange(20.0, 6.0, -1)) for key in keys})
+    slow["participation"] = (("mode", "state"), np.ones((14, 1)))
     slow = slow.assign_coords(state=["pitch"])
     decay = check_sections(Checked({"decay": found, "modes": slow}, {}, {}))[3]
+    assert decay.tables[-1].title == "Modes that decay slowest: 12 of 14"
+    assert [row[2] for row in decay.tables[-1].rows] == [f"{20 - k:.4f}" for k in range(12)]
     (only,) = decay.points
     assert only.startswith("pitch: after its release the model swings to 3 times the offset")
 
