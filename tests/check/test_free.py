@@ -67,6 +67,17 @@ def test_quadratic_damping_is_found_from_a_decay(model):
     assert found.q[0] == pytest.approx(8 / 3 * 0.3, rel=0.05)
 
 
+@pytest.mark.parametrize("period", [60.0, 180.0])
+def test_a_jerk_at_the_release_is_no_swing(period):
+    """As of surge, which the waves of the release shake too."""
+    time, rate = np.arange(0, 1200, 0.3), tau / period
+    jerk = 0.1 * np.exp(-time / 3) * np.sin(np.pi * time)
+    found = free_decay(np.exp(-0.1 * rate * time) * np.cos(rate * time) - jerk, 0.3)
+    assert found.period == pytest.approx(period, rel=1e-4)  # parabolas on samples
+    assert found.p == pytest.approx(0.1 * tau, rel=1e-3)
+    assert abs(found.q) < 1e-3  # of a p of 0.63
+
+
 @pytest.fixture
 def released(model):
     """A heave held at 1 m and released after 10 s, and again from 0.2 m; noise of 5 mm."""

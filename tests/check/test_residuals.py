@@ -1,5 +1,7 @@
 """Residuals of models that are right and wrong, and the oracles of their tests."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.random import default_rng
@@ -41,6 +43,34 @@ def test_bands_and_ages_add_up(run):
     assert (found.band_nrmse**2).sum("band").values == pytest.approx(whole.values)
     assert found.age_nrmse[0, 0] == pytest.approx(float(found.one_step[0]), rel=0.3)
     assert found.age_nrmse[0, -1] < 1
+
+
+def test_runs_count_alike_in_the_ages(run):
+    model, spans = fitted(run, 1), {"first": (150.0, 219.9), "second": (230.0, 299.9)}
+    parts = {name: run.assign_attrs(run=name, test_span=span) for name, span in spans.items()}
+    alone = [check.residuals(model, {name: part}) for name, part in parts.items()]
+    variances = [float(run.heave.sel(time=slice(a, b)).var()) for a, b in spans.values()]
+    squares = [of.age_nrmse**2 * each for of, each in zip(alone, variances, strict=True)]
+    both = check.residuals(model, parts).age_nrmse ** 2 * np.mean(variances)
+    # A start more or less in either, and the first instant, which is not forecast.
+    assert_allclose(both, np.mean(squares, axis=0), rtol=0.02)
+    assert not np.allclose(squares[0], squares[1], rtol=0.1)
+
+
+def test_memory_does_not_grow_with_what_the_starts_read():
+    """A history of 400 samples (3 kB) for each of 6000 starts, and copies of it, are 80 MB."""
+    rng = default_rng(0)
+    wave = autoregressive(rng.standard_normal(7000), 0.8)
+    attrs = {"encounter_period": 2.0, "test_span": (80.0, 699.9)}
+    run = record(0.1, attrs, eta=wave, heave=np.roll(wave, 1) + rng.standard_normal(7000))
+    model = HankelDMDc(399, 0, 1.0, delay_rows="exact").fit(
+        run.isel(time=slice(0, 2000)), ["heave"], ["eta"]
+    )
+    tracemalloc.start()
+    check.residuals(model, {"run": run})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 45e6
 
 
 @pytest.mark.oracle

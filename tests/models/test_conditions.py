@@ -12,7 +12,7 @@ from seas import sea
 
 from seakeep import HankelDMDc
 from seakeep.baselines import ARX
-from seakeep.models.conditions import disagreements
+from seakeep.models.conditions import Disagreement, disagreements
 
 DT, CHANNELS = 0.1, (["heave", "pitch"], ["eta"])
 SPEC = HankelDMDc(6, 20, 1e-2, delay_rows="exact", ridge_scale="per_snapshot")
@@ -59,9 +59,26 @@ def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reaso
     assert_allclose(each.value, value, rtol=0.1)
     assert "odd disagrees with the other runs: " in each.describe()
     assert ("set centre = 'run' in [model]" in each.describe()) == (reason == "offset")
+    assert each.units == ("m" if channel else "")
     # These runs state no water depth.
     assert "of a probe explains it" not in each.describe()
     assert ("water_depth in [rig]" in each.describe()) == (reason == "dynamics")
+
+
+@pytest.mark.parametrize(
+    ("channel", "units", "text", "drifts"),
+    [
+        ("surge", "m", "surge lies +0.5 m off", True),
+        ("yaw", "rad", "yaw lies +28.6 deg off", True),
+        ("mooring_bow", "N", "mooring_bow lies +0.5 N off", True),
+        ("heave", "m", "heave lies +0.5 m off", False),
+    ],
+)
+def test_an_offset_of_what_is_moored_may_be_drift(channel, units, text, drifts):
+    told = Disagreement("odd", 1.0, 0.5, "offset", channel, 0.5, units=units).describe()
+    assert text in told
+    assert ("may be real drift" in told) == drifts
+    assert ("Else correct its zero" in told) == drifts
 
 
 def test_another_unit_of_a_load_moves_its_mean_too():

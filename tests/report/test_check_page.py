@@ -10,8 +10,8 @@ from said import request_error
 from tables import rows_of
 from tutorial_study import edit, put_tutorial
 
-from seakeep import HankelDMDc
-from seakeep.check import Checked, check_model
+from seakeep import HankelDMDc, plot
+from seakeep.check import Checked, check_model, statistics
 from seakeep.cli import main
 
 pytest.importorskip("matplotlib")
@@ -73,11 +73,34 @@ def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
         coords={"motion": ["heave", "pitch"], "time": np.arange(4.0)},
     )
     keys = ("period", "damping_ratio", "decay_time", "modulus")
-    slow = xr.Dataset({key: ("mode", [1.0]) for key in keys})
-    slow["participation"] = (("mode", "state"), [[1.0]])
+    slow = xr.Dataset({key: ("mode", np.arange(20.0, 6.0, -1)) for key in keys})
+    slow["participation"] = (("mode", "state"), np.ones((14, 1)))
     slow = slow.assign_coords(state=["pitch"])
-    (only,) = check_sections(Checked({"decay": found, "modes": slow}, {}, {}))[3].points
+    decay = check_sections(Checked({"decay": found, "modes": slow}, {}, {}))[3]
+    assert decay.tables[-1].title == "Modes that decay slowest: 12 of 14"
+    assert [row[2] for row in decay.tables[-1].rows] == [f"{20 - k:.4f}" for k in range(12)]
+    (only,) = decay.points
     assert only.startswith("pitch: after its release the model swings to 3 times the offset")
+
+
+def test_large_loads_are_shown_alike_in_figure_and_table():
+    """At full scale, as where those of a model are a million times as large."""
+    run = moored_run(2)
+    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["mooring_bow"], ["eta"])
+    small = statistics(model, {"run": run})
+    ends = [side + end for side in ("extreme", "trough") for end in ("", "_lower", "_upper")]
+    keys = ["mean", "significant_double_amplitude", "peak", "deviation", "rayleigh_scale", *ends]
+    large = small.assign(1e6 * small[[*keys, "weibull_scale"]])
+    few, many = (
+        check_sections(Checked({"statistics": each}, {}, {}))[5].tables[0].rows
+        for each in (small, large)
+    )
+    assert [row[0] for row in many] == ["mooring_bow [MN]"] * 2
+    assert [row[1:] for row in many] == [row[1:] for row in few]
+    for draw in (plot.exceedance, plot.density):
+        few, many = (draw(each).axes[0] for each in (small, large))
+        assert "[MN]" in many.get_xlabel()
+        assert many.get_xlim() == pytest.approx(few.get_xlim())
 
 
 def test_several_probes_without_positions_are_not_compared_with_the_vessel():

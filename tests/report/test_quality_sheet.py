@@ -70,18 +70,23 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     flags[40:45] = FLAGS["missing"]
     heave[40:45] = np.nan
     found = {"quality": as_json([Finding(SamplesKind.CONSTANT, "first", "heave", 1.0)])}
-    run = record(0.1, found, heave=heave, pitch=np.deg2rad(5.0) * np.sin(time))
+    line = record(0.1, mooring_bow=2.5e6 + 1e6 * np.sin(time))
+    run = record(0.1, found, heave=heave, pitch=np.deg2rad(5.0) * np.sin(time)).merge(line)
     run = run.assign_coords(heave_flags=("time", flags))
     rows = {name: cells for name, *cells in channel_rows(run)}
     assert rows["pitch"][0] == "deg"
     assert float(rows["pitch"][2]) == pytest.approx(5.0, rel=2e-3)  # the nearest sample
+    assert rows["mooring_bow"][0] == "MN"
+    assert float(rows["mooring_bow"][2]) == pytest.approx(3.5, rel=2e-3)
     # Windows stand 1 s apart, and two are missing.
     centre, lags = np.array([1.0, 2.0, 5.0, 6.0]), np.array([0.01, 0.02, 0.01, 0.02])
     found = Agreement(
         period=6.0, motion=0.7, step=np.nan, lag=0.015, lag_spread=0.005, growth=0.0,
         correlation=1.0, nrmse=0.0, gain=1.0, centre=centre, lags=lags,
     )  # fmt: skip
-    top, pitch, lag = quality_figure(run, {"heave": found}).axes
+    figure = quality_figure(run, {"heave": found})
+    top, pitch, line, lag = figure.axes
+    assert "[MN]" in line.get_ylabel()
     assert pitch.get_ylabel().endswith("[deg]")
     assert top.get_facecolor() != pitch.get_facecolor()  # it has a finding
     marks = next(line for line in top.lines if line.get_label() == "missing").get_ydata()

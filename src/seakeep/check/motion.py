@@ -204,8 +204,9 @@ def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> xr.Dataset 
     """Period, p and q of a series that was released; a constant in it does not matter.
 
     Swings count from the largest on, until one is lost in noise. Extremes are those of parabolas
-    through a third of a half period on either side, which shrink all of them alike; what follows
-    is weighted by amplitude, as noise matters by its inverse.
+    through a third of a half period on either side, which shrink all of them alike; one that lies
+    nearer to the release is a jerk. What follows is weighted by amplitude, as noise matters by its
+    inverse.
 
     Parameters
     ----------
@@ -240,7 +241,10 @@ def free_decay(series: FloatArray, dt: float, noise: float = 0.0) -> xr.Dataset 
     if places.size < 3:
         return None
     places = places[np.argmax(np.abs(np.diff(series[places]))) :]  # other modes die out before
-    window = 2 * max((places[1] - places[0]) // 3, 1) + 1
+    reach = max((places[1] - places[0]) // 3, 1)
+    if places[0] < reach:  # a jerk, and no extreme of the swing
+        return free_decay(series[places[0] + 1 :], dt, noise)
+    window = 2 * reach + 1
     value, slope, bend = (
         scipy.signal.savgol_filter(series, window, 2, deriv=order)[places] for order in range(3)
     )

@@ -215,6 +215,8 @@ SEGMENT = 8
 """Encounter periods of a segment of the spectra, at most."""
 AGES = 15
 """Encounter periods over which a forecast grows old."""
+AT_ONCE = 1024
+"""Forecasts of one step that are made at once: each reads a history of its own."""
 
 
 def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dataset:
@@ -260,8 +262,11 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         """Errors of one step over the test part, inputs and measured states at its instants."""
         run = runs[name]
         first, last = window_of(model, run)
-        both = model.judged_runs(run, name, range(first, last), 1)
-        forecasts, measured = (each[:, 0] for each in both)
+        both = [
+            model.judged_runs(run, name, range(at, min(at + AT_ONCE, last)), 1)
+            for at in range(first, last, AT_ONCE)
+        ]
+        forecasts, measured = (np.concatenate(each)[:, 0] for each in zip(*both, strict=True))
         inputs = channel_matrix(run, model.inputs, name, slice(first + 1, last + 1))
         sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
         if sound.sum() < 2:
@@ -275,21 +280,18 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         "left out: one-step errors of",
     )
 
-    def aged(name: str) -> FloatArray:
-        """Squared errors over the time since each of several starts, (window, steps, N)."""
+    # Squared errors over the time since each of several starts, (steps, N), and how many.
+    squares, counted = np.zeros((2, AGES * lags, len(model.states)))
+    for name in stepped:
         run = runs[name]
         first, last = window_of(model, run)
         count = min(AGES * lags, last - first)
         starts = range(first, last - count + 1, lags)
-        forecasts, measured = model.judged_runs(run, name, starts, count)
-        squares = np.full((len(starts), AGES * lags, len(model.states)), np.nan)
-        squares[:, :count] = (forecasts - measured) ** 2
-        return squares
-
+        forecasts, then = model.judged_runs(run, name, starts, count)
+        errors = (forecasts - then) ** 2
+        counted[:count] += np.isfinite(errors).sum(axis=0)
+        squares[:count] += np.nan_to_num(errors, nan=0.0, posinf=0.0).sum(axis=0)
     every, inputs, measured = zip(*stepped.values(), strict=True)
-    squares = np.concatenate([aged(name) for name in stepped])
-    counted = np.isfinite(squares).sum(axis=0)
-    by_age = ratio(np.nan_to_num(squares, nan=0.0, posinf=0.0).sum(axis=0), counted)
     count = sum(map(len, every))
     if count <= 2 * lags:
         raise DataError(
@@ -297,6 +299,7 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
             f"more than {2 * lags}. Test on longer runs."
         )
     correlation = autocorrelation(every, lags)
+    by_age = ratio(squares, counted)
     statistic, probability = ljung_box(correlation, count)
     spread = np.sqrt(np.mean(np.concatenate([m - m.mean(axis=0) for m in measured]) ** 2, axis=0))
     whole = np.concatenate(every)

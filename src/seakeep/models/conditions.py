@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
+from seakeep.conventions import displayed
 from seakeep.errors import DataError, RequestError, quiet, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
@@ -32,6 +33,8 @@ STANDARD_ERRORS = 2.0
 """Standard errors over the windows by which it must be better."""
 EXPLAINS = 0.7
 """Part of what the run's own model gains, in squared errors, that a reason must explain."""
+DRIFTING = ("surge", "sway", "yaw")
+"""Motions that nothing but a mooring brings back."""
 LOST = 10.0
 """Error, SD, beyond which it counts no worse."""
 
@@ -58,6 +61,8 @@ class Disagreement:
         Mean or offset in units of the channel, distance in m, or factor; NaN for dynamics.
     spread : float
         Standard deviation of a distance, m.
+    units : str
+        SI unit of the channel.
     rival : str
         The other run, where only one is left: either may be wrong.
     placed : bool
@@ -71,6 +76,7 @@ class Disagreement:
     channel: str = ""
     value: float = np.nan
     spread: float = np.nan
+    units: str = ""
     rival: str = ""
     placed: bool = True
 
@@ -83,12 +89,21 @@ class Disagreement:
                 "no offset or scale explains it, and the place of a probe was not tried: that "
                 "takes water_depth in [rig] and the probe's x_position in [rig.positions]"
             )
+        factor, units = displayed(self.units)
+        units = f" {units}" if units not in ("", "1") else ""
+        value, remedy = factor * self.value, "Correct its zero"
+        if self.channel in DRIFTING or self.units == "N":
+            remedy = (
+                "Of a moored vessel that may be real drift: give the model what drives it, such as "
+                "a wind or observables = [{ kind = 'slow_squares', of = … }] in [model]. Else "
+                "correct its zero"
+            )
         what = {
-            "input": f"the mean of {self.channel}, {self.value:.3g}, is far from that of {rest}. "
+            "input": f"the mean of {self.channel}, {value:.3g}{units}, is far from that of {rest}. "
             "If another condition, such as a wind, is the cause, fit one model per condition, or "
             "one that varies with it: parameter in [model]. Else correct its zero",
-            "offset": f"{self.channel} lies {self.value:+.3g} off where a model of {rest} has it. "
-            "Correct its zero, or set centre = 'run' in [model]: departures from each run's means",
+            "offset": f"{self.channel} lies {value:+.3g}{units} off where a model of {rest} has "
+            f"it. {remedy}, or set centre = 'run' in [model]: departures from each run's means",
             "probe position": "its waves fit where they are carried by "
             f"{self.value:.3g} ± {self.spread:.1g} m, as if the probe stood elsewhere. Set "
             f"probe_offset = {self.value:.3g} in [runs.{self.run}], with alignment = "
@@ -165,8 +180,10 @@ def disagreements(
                     placed = True
             whole, alike = (float(_scores(each[odd]).mean()) for each in (errors, own))
             rival = next(iter(left)) if len(left) == 1 else ""
+            labels = others.state_labels + others.input_labels
+            units = {each.name: each.units for each in labels}.get(reason.get("channel", ""), "")
             disagreeing.append(
-                Disagreement(odd, whole, alike, rival=rival, placed=placed, **reason)
+                Disagreement(odd, whole, alike, units=units, rival=rival, placed=placed, **reason)
             )
     return disagreeing
 

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from seakeep.check import Checked
-from seakeep.conventions import displayed, is_elevation
+from seakeep.conventions import is_elevation
 from seakeep.report.figures import checks
 from seakeep.report.page import Section, drawing, section
-from seakeep.report.style import shown_unit
+from seakeep.report.style import prefixed, shown_unit
 from seakeep.report.tables import (
     MISSING,
     WORDS,
@@ -30,6 +30,8 @@ from seakeep.report.tables import (
 
 OVERSHOOT = 1.1
 """Largest swing over the offset that a free decay may show; the rest is for the noise of a fit."""
+SLOWEST = 12
+"""Modes in the table, as in the figure: what decays faster is seldom a motion of the vessel."""
 TURNED = -0.8
 """Correlation of forecast and measurement below which one of them looks turned over."""
 RARE = 0.01
@@ -195,7 +197,8 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
-    factors, units = zip(*map(displayed, result["units"].values), strict=True)
+    values = result[[*keys]].to_array().transpose("state", ...).values
+    factors, units = zip(*map(prefixed, result["units"].values, values), strict=True)
     names = [
         f"{state} [{shown_unit(unit)}]"
         for state, unit in zip(result["state"].values, units, strict=True)
@@ -314,12 +317,12 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
             "forecast leans on the waves and forgets the state."
         )
     taken = []
-    for own in entries(modes, "mode"):
+    for own in entries(modes.head(mode=SLOWEST), "mode"):
         shares = own["participation"].to_series().nlargest(2)
         taking = ", ".join(f"{state} {part:.2f}" for state, part in shares.items())
         taken.append(own.assign(taking=taking))
     figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
-    listed = table("modes", taken, modes=len(taken))
+    listed = table("modes", taken, shown=len(taken), modes=modes.sizes["mode"])
     return section("modes", decay, shown, figure, listed, more=words, points=points)
 
 

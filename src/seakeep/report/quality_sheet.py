@@ -11,13 +11,12 @@ import xarray as xr
 from seakeep.arrays import Datasets
 from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.conventions import displayed
 from seakeep.files import MARK, replacing, write_text
 from seakeep.quality import compared, findings_of
 from seakeep.quality.faults import FLAGS
 from seakeep.report.figures.histories import quality_figure
 from seakeep.report.page import Drawing, Section, drawing, inline_picture, rendered, section
-from seakeep.report.style import Figure, figure_style, shown_unit
+from seakeep.report.style import Figure, figure_style, prefixed, shown_unit
 from seakeep.report.tables import MISSING, Number, number, short, table
 from seakeep.signals.time_axis import ASSUMED, Clock
 
@@ -32,7 +31,7 @@ def channel_rows(run: xr.Dataset) -> Iterator[tuple[str, ...]]:
     """
     findings = findings_of(run)
     for name, channel in run.data_vars.items():
-        factor, unit = displayed(channel.attrs.get("units", ""))
+        factor, unit = prefixed(channel.attrs.get("units", ""), channel.values)
         numbers = pd.Series(factor * channel.values).agg(["min", "max", "mean", "std"])
         flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).values.astype(int)
         flagged = ", ".join(

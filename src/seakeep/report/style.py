@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import canonical_channel, displayed
@@ -176,7 +177,7 @@ def listed(models: Iterable[str]) -> str:
 
 def shown(channel: xr.DataArray) -> tuple[float, str]:
     """Factor to the unit in which a channel is shown, and its label for an axis."""
-    factor, units = displayed(channel.attrs.get("units", ""))
+    factor, units = prefixed(channel.attrs.get("units", ""), channel.values)
     return factor, axis_label(str(channel.name), units, channel.attrs.get("long_name"))
 
 
@@ -239,19 +240,25 @@ def plain_text(words: str) -> str:
     return words.replace("$", r"\$")
 
 
-def prefixed(units: str, largest: float) -> tuple[float, str]:
-    """Factor and unit in which a large force, moment, pressure or power is shown.
+def prefixed(units: str, values: npt.ArrayLike) -> tuple[float, str]:
+    """Factor and unit in which values are shown: angles in degrees, large forces with a prefix.
+
+    So are large moments, pressures and powers, and responses of any of them.
 
     Examples
     --------
-    >>> prefixed("N", 3.2e6), prefixed("N m", 4500.0), prefixed("m", 4500.0)
+    >>> prefixed("N", 3.2e6), prefixed("N m", [20, -4500]), prefixed("m", 4500.0)
     ((1e-06, 'MN'), (0.001, 'kN m'), (1.0, 'm'))
+    >>> prefixed("N/m", 2e5), prefixed("rad", 1.0)
+    ((0.001, 'kN/m'), (57.29577951308232, 'deg'))
     """
-    if units in _WITH_PREFIX:
+    factor, units = displayed(units)
+    if units.partition("/")[0] in _WITH_PREFIX:
+        largest = np.nanmax(np.abs(values), initial=0.0)
         for prefix, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
             if largest >= size:
                 return 1.0 / size, prefix + units
-    return 1.0, units
+    return factor, units
 
 
 def shown_unit(unit: str) -> str:

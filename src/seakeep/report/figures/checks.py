@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
-from seakeep.conventions import displayed
 from seakeep.errors import RequestError
 from seakeep.report.style import (
     COLOURS,
@@ -21,6 +21,7 @@ from seakeep.report.style import (
     legend_outside,
     panels,
     plain_text,
+    prefixed,
     short_label,
     shown_unit,
 )
@@ -45,9 +46,9 @@ def by_state(
         figure.align_ylabels()
 
 
-def _shown(own: xr.Dataset) -> tuple[float, str, str]:
-    """Factor and unit in which a state is shown, and its short label."""
-    factor, units = displayed(own["units"].item())
+def _shown(own: xr.Dataset, values: npt.ArrayLike) -> tuple[float, str, str]:
+    """Factor and unit in which values of a state are shown, and its short label."""
+    factor, units = prefixed(own["units"].item(), values)
     return factor, shown_unit(units) or "?", short_label(own["state"].item())
 
 
@@ -80,7 +81,7 @@ def response(
     answering = result.dropna("state", how="all", subset=["amplitude"]).sel(input=entry)
     most = 2 + 2 * (answering.sizes["state"] % 2 == 0)
     for own, gain, turn in by_state(answering, axes, (2.9, 1.75), 2, most):
-        factor, units, label = _shown(own)
+        factor, units, label = _shown(own, own["amplitude"])
         frequency, trained, phase = (own[k].values for k in ("frequency", "trained", "phase"))
         for place in (gain, turn):
             place.fill_between(
@@ -320,7 +321,7 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
     Figure
     """
     for own, place in by_state(result, axes, (3.0, 2.0)):
-        factor, unit, label = _shown(own)
+        factor, unit, label = _shown(own, own["peak"])
         level = np.linspace(0, 1.1 * np.nanmax(own["peak"], initial=0.0) or 1.0, 200)
         scale, shape, width = (
             float(own[key].sel(kind="measured"))
@@ -351,7 +352,7 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
 def density(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
     for own, place in by_state(result, axes, (3.0, 1.9)):
-        factor, unit, label = _shown(own)
+        factor, unit, label = _shown(own, own["deviation"])
         for kind in ("measured", "forecast"):
             height = own["density"].sel(kind=kind) / factor
             place.plot(factor * own["deviation"], height, **LINES[kind], label=kind)
@@ -414,7 +415,7 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """
     answering = result.dropna("state", how="all", subset=["slow_response"])
     for own, place in by_state(answering, axes, (3.0, 2.0)):
-        factor, unit, label = _shown(own)
+        factor, unit, label = _shown(own, own["slow_response"])
         mean, *slow = factor * own["slow_response"]
         place.axhline(0.0, **LINES["zero"])
         place.plot(own["frequency"], mean, **LINES["solid"], label="model, mean")
