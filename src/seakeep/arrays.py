@@ -90,10 +90,9 @@ def as_real(
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as why:  # a Dataset, or rows of several lengths
-        kind = type(values).__name__
         raise error(
-            f"{name} must be one array of real numbers; received {kind}. Give a channel, such as "
-            f"run['heave'], or rows of one length. ({why})"
+            f"{name} must be one array of real numbers; received {type(values).__name__}. Give a "
+            f"channel, such as run['heave'], or rows of one length. ({why})"
         ) from None
     if array.dtype.kind not in "fiub":
         remedy = _REMEDIES.get(array.dtype.kind, "Convert every value to a number, gaps to NaN")
@@ -192,17 +191,17 @@ def as_pair(
     DataError
         As :func:`as_series`; also if one is constant and must be `moving`.
     """
-    pair = tuple(
-        as_series(each, f"the {name} record", minimum=minimum)
+    pair = {
+        name: as_series(each, f"the {name} record", minimum=minimum)
         for name, each in (("first", first), ("second", second))
-    )
-    a, b = pair
+    }
+    a, b = pair.values()
     if a.shape != b.shape:
         raise RequestError(
             f"two records of the same length are needed, shape (time,); received {a.shape} and "
             f"{b.shape}. Cut them to their common time."
         )
-    for name, each in zip(("first", "second"), pair, strict=True):
+    for name, each in pair.items():
         if moving and np.ptp(each) == 0:
             raise DataError(
                 f"the {name} record is constant ({each[0]:g}), so it correlates with nothing. "
@@ -386,7 +385,8 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
     listed = f"Keys: {', '.join(known)}."
     for key in table:
         if key not in known:
-            near = did_you_mean(str(key), known)
-            raise RequestError(f"{what}unknown key '{key}'.{near} {listed}")
+            raise RequestError(
+                f"{what}unknown key '{key}'.{did_you_mean(str(key), known)} {listed}"
+            )
     if missing := [key for key in needed if key not in table]:
         raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")

@@ -466,8 +466,10 @@ def load_groups(path: Path | str, kind: str) -> Groups:
                 f"{head.get('seakeep_version', '?')}, and this seakeep reads format {FORMAT}. "
                 "Make the file again with this version, or update seakeep."
             )
-        contents = json.loads(head[CONTENTS])
-        out = {name: _read_group(file[name or "/"], each) for name, each in contents.items()}
+        out = {
+            name: _read_group(file[name or "/"], contents)
+            for name, contents in json.loads(head[CONTENTS]).items()
+        }
     for key in (MARK, "seakeep_format"):
         del out[""].attrs[key]
     return out
