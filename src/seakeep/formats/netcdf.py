@@ -72,14 +72,16 @@ def opened_netcdf(path: Path, group: str | None) -> xr.Dataset:
     what = "NetCDF or HDF5: cut off, damaged or of another kind"
     with decoding(path, what, "Copy or download it again."), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
-        how: dict[str, Any] = {"engine": "scipy"}
-        source: Path | io.BytesIO = path
         if classic:  # of a damaged file that it maps, scipy leaves the file open
-            source = io.BytesIO(path.read_bytes())
-        else:
-            how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
-        with xr.open_dataset(source, decode_times=False, **how) as opened:
-            return opened.load()
+            content = io.BytesIO(path.read_bytes())
+            return xr.load_dataset(content, decode_times=False, engine="scipy")
+        return xr.load_dataset(
+            path,
+            decode_times=False,
+            engine="h5netcdf",
+            group=_group(path, group),
+            phony_dims="sort",
+        )
 
 
 def _group(path: Path, wanted: str | None) -> str | None:
