@@ -369,8 +369,8 @@ def probe_separation(
     smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
     energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
     cross, k = cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
-    period = encounter_period(a, interval)
-    reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
+    omega = 2 * np.pi / encounter_period(a, interval)
+    reach = float(group_speed(omega, depth)) * REACH * a.size * interval
     least = abs(place) + np.pi / k[np.argmax(np.abs(cross))]
     step = 2 * np.pi / k[-1] / PLACES
     most = 0.5 * MOST_PLACES * step
@@ -467,16 +467,16 @@ class CarriedElevation:
 def band_limit(series: ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
     """Frequency below which a given part of a record's variance lies."""
     array = as_series(series, channels=True)
-    flat = array.reshape(array.shape[0], -1)
+    flat = array.reshape(len(array), -1)
     # Tapered, since a wave that the record's end cuts would leak into all frequencies.
-    taper = np.hanning(flat.shape[0] + 2)[1:-1, None]
+    taper = np.hanning(len(flat) + 2)[1:-1, None]
     power = np.abs(fft.rfft(taper * (flat - flat.mean(axis=0)), axis=0)) ** 2
     grown = np.cumsum(power.sum(axis=1))
     if not grown[-1] > 0:
         raise DataError(
             "the elevation is constant: there are no waves in it. Look for a dead probe."
         )
-    frequency = fft.rfftfreq(flat.shape[0], time_step(dt))
+    frequency = fft.rfftfreq(len(flat), time_step(dt))
     return float(frequency[np.searchsorted(grown, share * grown[-1])])
 
 
@@ -549,8 +549,7 @@ def _carried(
             "resample the elevation to some 30 samples per wave period first."
         )
     records = np.empty((count, *flat.shape))
-    nodes = chebyshev.chebpts1(count)
-    for record, node in zip(records, centre + half * nodes, strict=True):
+    for record, node in zip(records, centre + half * chebyshev.chebpts1(count), strict=True):
         carried = fft.irfft(spectrum * np.exp(-1j * k * node)[:, None], n=size, axis=0)
         record[:] = carried[padding : padding + len(flat)]
     terms = fft.dct(records[::-1], type=2, axis=0) / count

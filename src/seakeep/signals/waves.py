@@ -150,8 +150,7 @@ def repeated_waves(records: Mapping[str, ArrayLike], dt: float) -> dict[str, str
     >>> repeated_waves(runs, 0.05)
     {'a': 'a', 'b': 'b', 'again': 'b', 'high': 'high'}
     """
-    series = {name: as_series(each) for name, each in records.items()}
-    parts = {name: x[waves_part(x, dt)] for name, x in series.items()}
+    parts = {n: (x := as_series(each))[waves_part(x, dt)] for n, each in records.items()}
     every = max(int(min(map(_dominant_period, parts.values()), default=1.0) / PER_WAVE), 1)
     parts = {name: x[::every] - x.mean() for name, x in parts.items()}
     groups: dict[str, str] = {}
@@ -707,10 +706,9 @@ def find_leakage(
     waves = _analytic(record)
     found = []
     repeated = np.zeros(record.size, bool)
-    pool = [as_series(each, minimum=8) for each in training]
-    ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
-    starts = {*range(0, record.size - length + 1, length // 2), record.size - length}
-    for start in sorted(starts):
+    pool = enumerate(as_series(each, minimum=8) for each in training)
+    ready = [(index, _analytic(each)) for index, each in pool if each.size >= length]
+    for start in sorted({*range(0, record.size - length + 1, length // 2), record.size - length}):
         piece = waves[start : start + length]
         for index, reference in ready:
             # Normalised correlation of the piece at each place where it fits whole.
