@@ -80,8 +80,7 @@ def as_real(
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     parts = values if isinstance(values, list | tuple) else [values]
-    masked = sum(int(np.ma.getmaskarray(part).sum()) for part in parts if np.ma.isMA(part))
-    if masked:
+    if masked := sum(int(np.ma.getmaskarray(part).sum()) for part in parts if np.ma.isMA(part)):
         raise error(
             f"{name} holds {masked} masked value(s), which would be read as if they were "
             "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
@@ -220,7 +219,7 @@ def finite(array: FloatArray, name: str) -> FloatArray:
     """Return an array of at least one axis as it is; refuse NaN and infinity."""
     there = np.isfinite(array)
     if not there.all():
-        first = int(np.flatnonzero(~there.reshape(array.shape[0], -1).all(axis=1))[0])
+        first = np.argmin(there.reshape(len(array), -1).all(axis=1))
         raise DataError(
             f"{name} holds {int(np.count_nonzero(~there))} value(s) that are NaN or infinite, of "
             f"{array.size}, the first at sample {first}. Fill or cut the gap first "

@@ -469,8 +469,10 @@ def flag_samples(
         x, known = filled.values, data[name].attrs
         flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
         if count := filled.short.sum():
-            seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
-            repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
+            repaired.append(
+                f"{count} samples ({count * step:.3g} s of {x.size * step:.4g} s) bridged by "
+                "monotone cubics"
+            )
         if x.size >= 16 and np.ptp(x):
             own = read.get(str(name), x)
             own = np.where(np.isfinite(own), own, x)

@@ -464,8 +464,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
                 f"the lamp {how.lamp} (x, y, radius) lies outside the picture of {video.path}, "
                 f"{width} × {height} pixels. Correct its place."
             )
-    stop = how.stop
-    if stop and stop >= 0.5 * video.rate:
+    if (stop := how.stop) and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
             f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times "
