@@ -55,19 +55,17 @@ def lowpass_taps(
             f"passband {passband:g} Hz, stopband {stopband:g} Hz, half the sampling rate "
             f"{sampling_rate / 2:g} Hz. Lower the edges, or filter before resampling."
         )
-    edges = (passband / sampling_rate, stopband / sampling_rate)
+    low, high = passband / sampling_rate, stopband / sampling_rate
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
-        count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
+        count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (high - low))
         count += 1 - count % 2
-        taps = scipy.signal.firwin(
-            count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
-        )
+        taps = scipy.signal.firwin(count, (low + high) / 2, window=("kaiser", beta), fs=1.0)
         # Distances of the gain from one in the pass band and from zero in the stop band.
         points = 64 * taps.size
         gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
-        at_edges = np.abs(scipy.signal.freqz(taps, worN=edges, fs=1.0)[1])
-        passing = np.append(gain[frequency <= edges[0]], at_edges[0])
-        stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
+        at_low, at_high = np.abs(scipy.signal.freqz(taps, worN=(low, high), fs=1.0)[1])
+        passing = np.append(gain[frequency <= low], at_low)
+        stopped = np.append(gain[frequency >= high], at_high)
         if max(np.abs(passing - 1).max(), stopped.max()) <= 10 ** (-attenuation / 20):
             break
     return taps
