@@ -453,7 +453,7 @@ def load_groups(path: Path | str, kind: str) -> Groups:
     """
     import h5py
 
-    with h5py.File(read_sealed(path), "r") as file:
+    with h5py.File(read_sealed(path)) as file:
         head = dict(file.attrs)
         if (mark := head.get(MARK)) != kind:
             raise DataError(
@@ -581,7 +581,7 @@ def _mark_of_netcdf(path: Path) -> str | None:
     import h5py  # a tenth of the time of h5netcdf
 
     try:
-        with h5py.File(read_sealed(path), "r") as file:
+        with h5py.File(read_sealed(path)) as file:
             return str(file.attrs.get(MARK))
     except (DataError, OSError):  # not ours
         return None

@@ -247,7 +247,7 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
         )
     try:
         content = read_bytes(path)
-        table = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
+        table = tomllib.loads(content.decode("utf-8-sig"))
     except MissingFileError as error:
         raise MissingFileError(f"{error} A {what} file is expected here.{mend}") from None
     except UnicodeDecodeError as error:

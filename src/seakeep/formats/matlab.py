@@ -112,7 +112,7 @@ def _opaque(path: Path) -> dict[str, str]:
                 "ascii", "replace"
             )
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(path) as file:
         file.visititems(look)
     return opaque
 

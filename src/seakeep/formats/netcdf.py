@@ -95,7 +95,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
             parent = name.rpartition("/")[0]
             holding[parent] = holding.get(parent, 0) + 1
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(path) as file:
         file.visititems(look)
         listed = ", ".join(f"'{name}' ({count} sets)" for name, count in holding.items() if name)
         if wanted is not None and not isinstance(file.get(wanted), h5py.Group):

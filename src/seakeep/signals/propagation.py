@@ -555,7 +555,7 @@ def _carried(
     for record, node in zip(records, centre + half * chebyshev.chebpts1(count), strict=True):
         carried = fft.irfft(spectrum * np.exp(-1j * k * node)[:, None], n=size, axis=0)
         record[:] = carried[padding : padding + len(flat)]
-    terms = fft.dct(records[::-1], type=2, axis=0) / count
+    terms = fft.dct(records[::-1], axis=0) / count
     terms[0] *= 0.5
     terms[0] += mean
     return CarriedElevation(lowest, highest, terms)

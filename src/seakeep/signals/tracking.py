@@ -615,7 +615,7 @@ def _motions(
         filled[begin:end] = inner and end - begin <= how.bridge * rate + 1e-9
     if filled.any():
         there = np.flatnonzero(good)
-        between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
+        between = scipy.interpolate.PchipInterpolator(there, table[there])
         table[filled] = between(np.flatnonzero(filled))
     if how.passband:
         for begin, end in stretches(good | filled):
