@@ -378,14 +378,16 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
     """
     taken = [each for each in fields(kind) if each.init]
     known = [each.name for each in taken]
-    needed = [
-        each.name for each in taken if each.default is MISSING and each.default_factory is MISSING
-    ]
     listed = f"Keys: {', '.join(known)}."
     for key in table:
         if key not in known:
             raise RequestError(
                 f"{what}unknown key '{key}'.{did_you_mean(str(key), known)} {listed}"
             )
-    if missing := [key for key in needed if key not in table]:
+    missing = [
+        each.name
+        for each in taken
+        if each.default is MISSING and each.default_factory is MISSING and each.name not in table
+    ]
+    if missing:
         raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")

@@ -93,7 +93,7 @@ def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreem
         for name in others:
             stuck = None
             if f"{name}_flags" in run.coords:
-                stuck = (run[f"{name}_flags"].values & STUCK) > 0
+                stuck = run[f"{name}_flags"].values & STUCK
             step = run[name].attrs.get("reading_step", np.nan)
             out[name, first] = compare_sensors(filled(run[name]), trusted, dt, window, stuck, step)
     return out
