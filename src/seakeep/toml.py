@@ -179,7 +179,7 @@ class Table(BaseModel):
         try:
             return handler(received)
         except ValidationError as error:
-            refused = _mistakes(error, cls)
+            refused = [_mistake(item, cls) for item in error.errors(include_url=False)]
         raise ValidationError.from_exception_data(
             cls.__name__,
             [
@@ -305,7 +305,8 @@ def validated(
     try:
         settings = root.model_validate(received)
     except ValidationError as error:
-        raise refusal(source, what, _mistakes(error, root)) from None
+        refused = [_mistake(item, root) for item in error.errors(include_url=False)]
+        raise refusal(source, what, refused) from None
     if also and (mistakes := list(also(settings))):
         raise refusal(source, what, mistakes)
     return settings
@@ -341,11 +342,6 @@ def _line_of(text: str, place: tuple[str, ...]) -> str:
 
 def _parts(dotted: str) -> tuple[str, ...]:
     return tuple("".join(match) for match in _PART.findall(dotted))
-
-
-def _mistakes(error: ValidationError, table: type[BaseModel]) -> list[Mistake]:
-    """Places and words of errors of pydantic in a table."""
-    return [_mistake(item, table) for item in error.errors(include_url=False)]
 
 
 def _mistake(item: Any, table: type[BaseModel]) -> Mistake:

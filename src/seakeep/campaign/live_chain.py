@@ -100,7 +100,7 @@ class LiveChain:
             ready = math.floor((newest - self.delay - origin) / self.dt + 1e-9) + 1
         if origin is None or ready - given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
-            out = xr.Dataset(empty, coords={"time": np.empty(0)})
+            out = xr.Dataset(empty, {"time": np.empty(0)})
         else:
             out = self._prepared(rows, origin, given, ready)
             given = ready

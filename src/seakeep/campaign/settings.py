@@ -726,11 +726,10 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
             sound = False
             yield (*place, "expression"), str(error)
             continue
-        key = "expression" if each.expression is not None else "from"
         for source in sources:
             if source not in names:
                 yield (
-                    (*place, key),
+                    (*place, "from" if each.expression is None else "expression"),
                     f"the channel '{source}' does not exist.{did_you_mean(source, names)} "
                     f"Channels: {', '.join(names)}.",
                 )

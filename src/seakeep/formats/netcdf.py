@@ -60,7 +60,7 @@ def _text(attribute: Any) -> str:
     if not isinstance(attribute, bytes):
         return str(attribute)
     try:
-        return attribute.decode("utf-8")
+        return attribute.decode()
     except UnicodeDecodeError:
         return attribute.decode("latin-1")
 

@@ -152,7 +152,7 @@ def derivatives(record: Record) -> Findings:
     """Rates and accelerations of another sign or scale than the motion they belong to."""
     run, dt, count = record.whole, step_of(record.whole), record.whole.sizes["time"]
     frequency = np.fft.rfftfreq(count, dt)
-    for motion, (order, (suffix, words)) in product(MOTIONS, enumerate(DERIVED, start=1)):
+    for motion, (order, (suffix, words)) in product(MOTIONS, enumerate(DERIVED, 1)):
         name = motion + suffix
         if name in TILTED or not {motion, name} <= {*run.data_vars}:
             continue

@@ -201,7 +201,7 @@ def resample(
 
     # The lower one, in cycles per old sample.
     nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
-    return _sinc_sums(array, position, (PASSBAND * nyquist, nyquist), attenuation)
+    return _sinc_sums(array, position, nyquist, attenuation)
 
 
 PHASES = 256
@@ -211,16 +211,17 @@ AT_ONCE = 500_000
 
 
 def _sinc_sums(
-    array: FloatArray, position: FloatArray, edges: tuple[float, float], attenuation: float
+    array: FloatArray, position: FloatArray, nyquist: float, attenuation: float
 ) -> FloatArray:
     """Low-passed values of a series between its samples.
 
-    `position` counts in old samples; `edges`, of the pass and stop bands, are cycles per sample.
+    `position` counts in old samples; what lies above `nyquist` (cycles per sample) is stopped.
     """
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
-    width = edges[1] - edges[0]
+    passed = PASSBAND * nyquist
+    width = nyquist - passed
     half = math.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1)  # by Kaiser's formula
-    bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
+    bank = _kernels(half, 0.1102 * (attenuation - 8.7), passed + nyquist)
     base = np.floor(position).astype(int)
     place = (position - base) * PHASES
     phase = np.minimum(place.astype(int), PHASES - 1)

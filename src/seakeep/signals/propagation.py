@@ -605,8 +605,8 @@ def mean_spectrum(
     power : ndarray, shape (LINES,)
         Mean over records and probes; they sum to one.
     """
-    top = min(EDGES[1] / period, highest, 0.5 / dt)
-    frequency = np.linspace(EDGES[0] / period, top, LINES)
+    low, high = EDGES
+    frequency = np.linspace(low / period, min(high / period, highest, 0.5 / dt), LINES)
     power = np.zeros(LINES)
     for record in records:
         length = min(len(record), round(16 * period / dt))
@@ -675,8 +675,7 @@ def carriers(
 def slow_position(surge: FloatArray, period: float) -> FloatArray:
     """Surge below ``CUTOFF`` without delay; `period` in samples."""
     sections = signal.butter(4, 2 * CUTOFF / period, output="sos")
-    padding = min(len(surge) - 1, round(SETTLED * period))
-    return signal.sosfiltfilt(sections, surge, padlen=padding)
+    return signal.sosfiltfilt(sections, surge, padlen=min(len(surge) - 1, round(SETTLED * period)))
 
 
 def position_taps(

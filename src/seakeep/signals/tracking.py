@@ -184,7 +184,6 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     long_side, short_side = (np.sqrt(12 * (mean + sign * half)) for sign in (1, -1))
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
-    cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
     return panel | {
         "centroid_x": left + x0 + centre[0],
         "centroid_y": top + y0 + centre[1],
@@ -193,7 +192,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
         "panel_height": short_side,
         "panel_area": area,
         "panel_fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
-        "cut": cut,
+        "cut": min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0],
         **_corners(weights, centre, angle, long_side, short_side),
     }
 

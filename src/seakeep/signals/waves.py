@@ -366,8 +366,8 @@ def wave_heights(series: ArrayLike, dt: float) -> FloatArray:
     (46, 0.1)
     """
     x = as_series(series)
-    edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
-    return np.array([np.ptp(x[first:last]) for first, last in pairwise(edges)], float)
+    edges = pairwise(np.ceil(zero_up_crossings(x, dt) / dt).astype(int))
+    return np.array([np.ptp(x[first:last]) for first, last in edges], float)
 
 
 def wave_spectrum(
@@ -592,8 +592,7 @@ def noise_floor(series: ArrayLike) -> float:
         return 0.0
     x = scipy.signal.detrend(over_gaps(x))
     taper = np.hanning(x.size)
-    power = np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)
-    return math.sqrt(noise_level(power))
+    return math.sqrt(noise_level(np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)))
 
 
 def noise_level(power: FloatArray) -> float:
