@@ -326,7 +326,7 @@ def compare_sensors(
     gain = 0.0 if gain < 1e-6 else gain  # what resampling makes of a constant
     nothing = Agreement(period, np.nan, step, *(np.nan,) * 5, gain, empty, empty)
     length = 4 * period if window is None else window
-    if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
+    if not 0 < gain < np.inf or x.size * dt < length + period:
         return nothing
     stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
 
