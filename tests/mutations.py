@@ -55,7 +55,7 @@ CHANGES = {
         ("own -= turn * round(own.mean() / turn) if own.size else 0.0", "own -= 0.0", "campaign/test_steps.py::test_a_heading_has_no_jumps_of_a_whole_turn"),
         ("discont=JUMP * turn", "discont=9 * turn", "campaign/test_steps.py::test_a_heading_has_no_jumps_of_a_whole_turn"),
         ('"sampling_rate", "group"}', '"sampling_rate"}', "formats/test_read_rosbag.py::test_topics_of_one_bag_are_loggers_as_the_page_says"),
-        ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ('"accuracy"] = factor * each.accuracy', '"accuracy"] = each.accuracy', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
         ("groups[name] = group.sel(", "groups[name] = group; group.sel(", "campaign/test_plausibility.py::test_faults_outside_the_span_are_none_of_the_run"),
         ("not (own.sampling_rate and time in columns.faults)", "True", "campaign/test_steps.py::test_dates_and_seconds_of_day_are_in_step_over_midnight"),
         ("own > MOST_FINER * dt", "own < MOST_FINER * dt", "campaign/test_prepare.py::test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one"),
@@ -591,7 +591,7 @@ CHANGES = {
     ],
     "signals/filters.py": [
         ("0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)", "0.5", "signals/test_time_axis.py::test_what_would_alias_is_removed"),
-        ("sum(edges) / 2, window", "edges[1], window", "signals/test_filters.py::test_gains_of_the_taps"),
+        ("(low + high) / 2, window", "high, window", "signals/test_filters.py::test_gains_of_the_taps"),
         ("weights, view[base[rows] + 1]", "weights, view[base[rows]]", "signals/test_time_axis.py::test_tabulated_kernels_are_the_kernels"),
     ],
     "signals/lags.py": [

@@ -80,8 +80,7 @@ def as_real(
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     parts = values if isinstance(values, list | tuple) else [values]
-    masked = sum(int(np.ma.getmaskarray(part).sum()) for part in parts if np.ma.isMA(part))
-    if masked:
+    if masked := sum(int(np.ma.getmaskarray(part).sum()) for part in parts if np.ma.isMA(part)):
         raise error(
             f"{name} holds {masked} masked value(s), which would be read as if they were "
             "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
@@ -90,10 +89,9 @@ def as_real(
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as why:  # a Dataset, or rows of several lengths
-        kind = type(values).__name__
         raise error(
-            f"{name} must be one array of real numbers; received {kind}. Give a channel, such as "
-            f"run['heave'], or rows of one length. ({why})"
+            f"{name} must be one array of real numbers; received {type(values).__name__}. Give a "
+            f"channel, such as run['heave'], or rows of one length. ({why})"
         ) from None
     if array.dtype.kind not in "fiub":
         remedy = _REMEDIES.get(array.dtype.kind, "Convert every value to a number, gaps to NaN")
@@ -192,17 +190,17 @@ def as_pair(
     DataError
         As :func:`as_series`; also if one is constant and must be `moving`.
     """
-    pair = tuple(
-        as_series(each, f"the {name} record", minimum=minimum)
+    pair = {
+        name: as_series(each, f"the {name} record", minimum=minimum)
         for name, each in (("first", first), ("second", second))
-    )
-    a, b = pair
+    }
+    a, b = pair.values()
     if a.shape != b.shape:
         raise RequestError(
             f"two records of the same length are needed, shape (time,); received {a.shape} and "
             f"{b.shape}. Cut them to their common time."
         )
-    for name, each in zip(("first", "second"), pair, strict=True):
+    for name, each in pair.items():
         if moving and np.ptp(each) == 0:
             raise DataError(
                 f"the {name} record is constant ({each[0]:g}), so it correlates with nothing. "
@@ -221,7 +219,7 @@ def finite(array: FloatArray, name: str) -> FloatArray:
     """Return an array of at least one axis as it is; refuse NaN and infinity."""
     there = np.isfinite(array)
     if not there.all():
-        first = int(np.flatnonzero(~there.reshape(array.shape[0], -1).all(axis=1))[0])
+        first = np.argmin(there.reshape(len(array), -1).all(axis=1))
         raise DataError(
             f"{name} holds {int(np.count_nonzero(~there))} value(s) that are NaN or infinite, of "
             f"{array.size}, the first at sample {first}. Fill or cut the gap first "
@@ -380,13 +378,16 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
     """
     taken = [each for each in fields(kind) if each.init]
     known = [each.name for each in taken]
-    needed = [
-        each.name for each in taken if each.default is MISSING and each.default_factory is MISSING
-    ]
     listed = f"Keys: {', '.join(known)}."
     for key in table:
         if key not in known:
-            near = did_you_mean(str(key), known)
-            raise RequestError(f"{what}unknown key '{key}'.{near} {listed}")
-    if missing := [key for key in needed if key not in table]:
+            raise RequestError(
+                f"{what}unknown key '{key}'.{did_you_mean(str(key), known)} {listed}"
+            )
+    missing = [
+        each.name
+        for each in taken
+        if each.default is MISSING and each.default_factory is MISSING and each.name not in table
+    ]
+    if missing:
         raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")

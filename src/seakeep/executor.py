@@ -60,7 +60,7 @@ def in_order(
     batches = [items[first : first + size] for first in range(0, len(items), size)]
     pieces = _done(function, data, batches, executor, ordered=True)
     results = (result for _, piece in pieces for result in piece)
-    for done, result in enumerate(results, start=1):
+    for done, result in enumerate(results, 1):
         if progress:
             progress(done, len(items), f"member {done}")
         yield result
@@ -175,8 +175,9 @@ def processes(workers: int) -> Iterator[Executor]:
 
 def _start_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    parent = multiprocessing.parent_process()
-    if parent:  # a parent that was killed leaves no worker behind
+    if (
+        parent := multiprocessing.parent_process()
+    ):  # a parent that was killed leaves no worker behind
         sentinel = parent.sentinel
         threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
 

@@ -453,7 +453,7 @@ def load_groups(path: Path | str, kind: str) -> Groups:
     """
     import h5py
 
-    with h5py.File(read_sealed(path), "r") as file:
+    with h5py.File(read_sealed(path)) as file:
         head = dict(file.attrs)
         if (mark := head.get(MARK)) != kind:
             raise DataError(
@@ -466,8 +466,10 @@ def load_groups(path: Path | str, kind: str) -> Groups:
                 f"{head.get('seakeep_version', '?')}, and this seakeep reads format {FORMAT}. "
                 "Make the file again with this version, or update seakeep."
             )
-        contents = json.loads(head[CONTENTS])
-        out = {name: _read_group(file[name or "/"], each) for name, each in contents.items()}
+        out = {
+            name: _read_group(file[name or "/"], contents)
+            for name, contents in json.loads(head[CONTENTS]).items()
+        }
     for key in (MARK, "seakeep_format"):
         del out[""].attrs[key]
     return out
@@ -579,7 +581,7 @@ def _mark_of_netcdf(path: Path) -> str | None:
     import h5py  # a tenth of the time of h5netcdf
 
     try:
-        with h5py.File(read_sealed(path), "r") as file:
+        with h5py.File(read_sealed(path)) as file:
             return str(file.attrs.get(MARK))
     except (DataError, OSError):  # not ours
         return None

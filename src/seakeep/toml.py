@@ -105,8 +105,8 @@ def parse_length(text: str) -> Length:
             "a text in place of a number counts in encounter periods, such as '1.5 T', or in "
             "seconds, such as '0.5 s'; samples and hertz are numbers without quotes"
         )
-    units: dict[str, Literal["T", "s", "/T"]] = {"T": "T", "s": "s"}
-    return Length(float(match[1]), units.get(match[2], "/T"))
+    unit = match[2]
+    return Length(float(match[1]), "/T" if "/" in unit else "s" if unit == "s" else "T")
 
 
 def _length(value: object) -> Length:
@@ -247,7 +247,7 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
         )
     try:
         content = read_bytes(path)
-        table = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
+        table = tomllib.loads(content.decode("utf-8-sig"))
     except MissingFileError as error:
         raise MissingFileError(f"{error} A {what} file is expected here.{mend}") from None
     except UnicodeDecodeError as error:
@@ -319,16 +319,15 @@ def refusal(source: Path | str, what: str, mistakes: Iterable[Mistake]) -> Reque
         text = source.read_bytes().decode("utf-8-sig", "replace")
     lines = []
     for place, words in dict.fromkeys(mistakes):
-        number = _line_of(text, place)
-        line = "" if number is None else f"line {number}, "
-        lines.append(f"  {line}{'.'.join(place) or 'the file'}: {words}")
+        key = ".".join(place) or "the file"
+        lines.append(f"  {_line_of(text, place)}{key}: {words}")
     heading = "1 mistake" if len(lines) == 1 else f"{len(lines)} mistakes"
     return RequestError(f"{source}: {heading} in the {what} file\n" + "\n".join(lines))
 
 
-def _line_of(text: str, place: tuple[str, ...]) -> int | None:
-    """Number of the line that states a key, or the innermost table around it."""
-    best, depth, table = None, 0, ()  # type: tuple[int | None, int, tuple[str, ...]]
+def _line_of(text: str, place: tuple[str, ...]) -> str:
+    """Words for the line that states a key, or the innermost table around it; empty for none."""
+    best, depth, table = "", 0, ()  # type: tuple[str, int, tuple[str, ...]]
     for number, line in enumerate(text.splitlines(), 1):
         if match := _HEADER.fullmatch(line):
             here = table = _parts(match[1])
@@ -337,7 +336,7 @@ def _line_of(text: str, place: tuple[str, ...]) -> int | None:
         else:
             continue
         if len(here) > depth and place[: len(here)] == here:
-            best, depth = number, len(here)
+            best, depth = f"line {number}, ", len(here)
     return best
 
 
@@ -357,8 +356,8 @@ def _mistake(item: Any, table: type[BaseModel]) -> Mistake:
     key = place[: 1 + (get_origin(field.annotation) is dict)]
     give = f" Give {description}." if description else ""
     if kind == "extra_forbidden":
-        near, keys = did_you_mean(key[-1], fields), ", ".join(fields)
-        words = f"unknown key, received {_shown(value)}.{near} Keys here: {keys}."
+        near = did_you_mean(key[-1], fields)
+        words = f"unknown key, received {_shown(value)}.{near} Keys here: {', '.join(fields)}."
     elif (kind == "missing" and len(place) > 1) or kind == "too_long":
         words = f"received {_shown(value)}, a list of the wrong length ({len(value)}).{give}"
     elif kind == "too_short":

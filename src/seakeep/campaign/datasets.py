@@ -105,7 +105,7 @@ def fetch(dataset: PublicDataset, folder: Path, progress: Progress | None = None
     if not dataset.sources:
         raise RequestError(f"'{dataset.name}' cannot be fetched; {dataset.note}.")
     target = make_folder(folder / dataset.name)
-    for done, (name, wanted) in enumerate(dataset.files.items(), start=1):
+    for done, (name, wanted) in enumerate(dataset.files.items(), 1):
         _fetch_file(name, wanted, target, dataset.sources)
         if progress:
             progress(done, len(dataset.files), name)

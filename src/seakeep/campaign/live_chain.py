@@ -83,7 +83,11 @@ class LiveChain:
         for key, table in samples.items():
             more = self._checked(key, table)
             rows[key] = {name: np.concatenate([x, more[name]]) for name, x in rows[key].items()}
-        instants = {key: self._instants(key, table) for key, table in rows.items()}
+        # On the reference's clock.
+        instants = {
+            key: self._run.clocks[key].reference(rows[key][name] * factor)
+            for key, (name, factor) in self._time.items()
+        }
         self._check_all_send(instants)
         origin, given, ready = self._origin, self._given, 0
         if all(each.size for each in instants.values()):
@@ -96,7 +100,7 @@ class LiveChain:
             ready = math.floor((newest - self.delay - origin) / self.dt + 1e-9) + 1
         if origin is None or ready - given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
-            out = xr.Dataset(empty, coords={"time": np.empty(0)})
+            out = xr.Dataset(empty, {"time": np.empty(0)})
         else:
             out = self._prepared(rows, origin, given, ready)
             given = ready
@@ -196,11 +200,6 @@ class LiveChain:
         if past.any():
             arrays[name] = counted[last.size :] / factor
         return arrays
-
-    def _instants(self, key: str, table: Mapping[str, FloatArray]) -> FloatArray:
-        """Instants of a logger's rows on the reference's clock."""
-        name, factor = self._time[key]
-        return self._run.clocks[key].reference(table[name] * factor)
 
     def _check_all_send(self, instants: Mapping[str, FloatArray]) -> None:
         """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""

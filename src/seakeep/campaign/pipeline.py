@@ -252,8 +252,7 @@ def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
     pair = own.shared or own.correlated
     if not pair:
         stated = own.offset is not None or own.drift is not None
-        method = "as stated" if stated else ASSUMED
-        return Clock(near, 1e-6 * (own.drift or 0.0), method=method)
+        return Clock(near, 1e-6 * (own.drift or 0.0), method="as stated" if stated else ASSUMED)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])
     if not np.ptp(series) or not np.ptp(other):
@@ -355,14 +354,15 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
         if missing is not None:  # of float32 as well
             readings = np.where(np.isclose(readings, missing, rtol=1e-6, atol=0), np.nan, readings)
         values = each.sign * factor * (readings + each.offset)
-        attributes: dict[str, object] = {"units": target}
-        attributes["long_name"] = long_name_of(name, each.long_name)
+        long_name = long_name_of(name, each.long_name)
+        attributes: dict[str, object] = {"units": target, "long_name": long_name}
         if target == "rad":
             read, values = values, _without_jumps(values)
             if values is not read:
                 attributes["jumps"] = int(np.sum(np.abs(np.diff(values - read)) > 1))
-        accuracy = {} if each.accuracy is None else {"accuracy": factor * each.accuracy}
-        variables[name] = ("time", values[records], attributes | accuracy)
+        if each.accuracy is not None:
+            attributes["accuracy"] = factor * each.accuracy
+        variables[name] = ("time", values[records], attributes)
     return xr.Dataset(
         variables, {"time": ("time", time[records], {"units": "s", "long_name": "time"})}
     )
@@ -442,8 +442,7 @@ def _regular(
             mend = "jitter = 'interpolate'"
         if mend:
             raise DataError(f"{error} Or state {mend} in [preparation].") from None
-    series = np.column_stack([each.values for each in data.values()])
-    new, values = onto_uniform(time, series, name)
+    new, values = onto_uniform(time, np.column_stack([x.values for x in data.values()]), name)
     read = data.assign_coords(time=data["time"].copy(data=new[report.place])).reindex(time=new)
     done = {
         "time_gaps": len(report.gaps),
@@ -470,8 +469,10 @@ def flag_samples(
         x, known = filled.values, data[name].attrs
         flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
         if count := filled.short.sum():
-            seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
-            repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
+            repaired.append(
+                f"{count} samples ({count * step:.3g} s of {x.size * step:.4g} s) bridged by "
+                "monotone cubics"
+            )
         if x.size >= 16 and np.ptp(x):
             own = read.get(str(name), x)
             own = np.where(np.isfinite(own), own, x)
@@ -559,7 +560,7 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     for name in [each for each in run.settings.channel_names if each in channels]:
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:
-            lost = (flags.values & MISSING) > 0
+            lost = flags.values & MISSING
             data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].values))
             coordinates[f"{name}_flags"] = flags
         if name in run.settings.rig.positions:
@@ -626,8 +627,7 @@ def cropped(run: Run) -> Run:
     data, groups, reference = run.data, dict(run.groups), run.reference_time
     place, time, record = f"runs.{run.name}.", data["time"].values, (reference[0], reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
-    step = (record[1] - record[0]) / (reference.size - 1)
-    slack = max(usual_step(time), step) * (1 + 1e-6)
+    slack = max(usual_step(time), np.ptp(record) / (reference.size - 1)) * (1 + 1e-6)
     spans = {key: span for key in ("span", "train", "test") if (span := run.span(key))}
     parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
     if "span" in parts:
@@ -653,11 +653,6 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
     """
     settings, preparation = run.settings, run.settings.preparation
     times = {name: settings.instruments[name] if name else settings.files for name in run.groups}
-    rates = {
-        name: Rate(own.sampling_rate, own.time is None and own.sampling_rate_assumed)
-        for name, own in times.items()
-        if own.sampling_rate
-    }
     channels = run.channels
     record = Record(
         run=run.name,
@@ -669,7 +664,11 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
         water_depth=settings.rig.water_depth,
         stated_period=settings.campaign.encounter_period,
         redundant=redundant_pairs(settings, run.period),
-        rates=rates,
+        rates={
+            name: Rate(own.sampling_rate, own.time is None and own.sampling_rate_assumed)
+            for name, own in times.items()
+            if own.sampling_rate
+        },
         assumed_units={
             name: each.unit or "-" for name, each in channels.items() if each.unit_assumed
         },

@@ -138,9 +138,8 @@ class Campaign:
 
     @property
     def _measures_period(self) -> bool:
-        settings = self.settings
-        asked = settings.preparation.steps_per_period or self._lengths
-        return bool(asked) and not settings.campaign.encounter_period
+        asked = self.settings.preparation.steps_per_period or self._lengths
+        return bool(asked) and not self.settings.campaign.encounter_period
 
     @cached_property
     def _lengths(self) -> list[tuple[str, ...]]:

@@ -673,21 +673,19 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
 
 def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     """Keys in encounter periods where there is no period, or where it is measured with them."""
-    places = list(lengths(settings))
     wave, stated = settings.wave_channel, settings.campaign.encounter_period
     if stated:
         yield from span_mistakes(settings, stated)
-    if not places or stated:
         return
-    if wave is None:
-        yield (
-            places[0],
-            "counts in encounter periods, and the campaign has none. State encounter_period (s) or "
-            "period_channel in [campaign], or name a channel eta_…",
-        )
-        return
-    for place in places:
+    for place in lengths(settings):
         head, name, *_ = place
+        if wave is None:
+            yield (
+                place,
+                "counts in encounter periods, and the campaign has none. State encounter_period "
+                "(s) or period_channel in [campaign], or name a channel eta_…",
+            )
+            return
         if (head == "runs" and name in settings.period_runs) or head == "instruments":
             yield (
                 place,
@@ -726,11 +724,10 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
             sound = False
             yield (*place, "expression"), str(error)
             continue
-        key = "expression" if each.expression is not None else "from"
         for source in sources:
             if source not in names:
                 yield (
-                    (*place, key),
+                    (*place, "from" if each.expression is None else "expression"),
                     f"the channel '{source}' does not exist.{did_you_mean(source, names)} "
                     f"Channels: {', '.join(names)}.",
                 )

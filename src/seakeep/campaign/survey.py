@@ -139,7 +139,7 @@ def survey(
     pools = settings.instruments.pool_drift
     # Those whose drifts are pooled with theirs, too.
     pooled = settings.used_runs if pools and any(settings.runs[n].files for n in asked) else ()
-    clock_runs = [n for n in dict.fromkeys([*asked, *pooled]) if settings.runs[n].files]
+    clock_runs = [n for n in (*asked, *pooled) if settings.runs[n].files]
     period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     kept: dict[str, Run] = {}

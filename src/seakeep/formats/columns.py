@@ -128,12 +128,12 @@ def split_unit(header: str) -> tuple[str, str | None]:
     (('Heave', 'mm'), ('Pitch', 'deg'), ('Heave (bow)', None))
     """
     header = header.strip()
-    if match := _BRACKETS.match(header):
-        return match["name"].strip(), match["unit"].strip()
-    match = _PARENTHESES.match(header)
-    if match and match["unit"].strip() and is_unit(match["unit"]):
-        return match["name"].strip(), match["unit"].strip()
-    return header, None
+    match = _BRACKETS.match(header)
+    if not match:
+        match = _PARENTHESES.match(header)
+        if not match or not match["unit"].strip() or not is_unit(match["unit"]):
+            return header, None
+    return match["name"].strip(), match["unit"].strip()
 
 
 def named_unit(name: str) -> tuple[str, str | None]:
@@ -237,6 +237,7 @@ def decoding(path: Path, what: str, mend: str) -> Iterator[None]:
     except SeakeepError:
         raise
     except Exception as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
-        said = "structs and cells nest without end" if isinstance(error, RecursionError) else said
+        said = (str(error) or type(error).__name__).splitlines()[0]
+        if isinstance(error, RecursionError):
+            said = "structs and cells nest without end"
         raise DataError(f"{path} cannot be read as {what} ({said}). {mend}") from None

@@ -112,7 +112,7 @@ def _opaque(path: Path) -> dict[str, str]:
                 "ascii", "replace"
             )
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(path) as file:
         file.visititems(look)
     return opaque
 
@@ -163,9 +163,10 @@ def _units(content: Mapping[str, Any]) -> dict[str, str]:
 
 def _channels(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
     """Vectors of a file, and the columns of a matrix beside which their names stand."""
-    arrays = {key: np.asarray(value) for key, value in content.items()}
     arrays = {
-        k: a.astype(float) for k, a in arrays.items() if a.dtype.kind in "fiub" and a.size > 1
+        key: array.astype(float)
+        for key, value in content.items()
+        if (array := np.asarray(value)).dtype.kind in "fiub" and array.size > 1
     }
     vectors = {key: array for key, array in arrays.items() if array.ndim == 1}
     names = _texts(content, _NAME_KEYS)

@@ -60,7 +60,7 @@ def _text(attribute: Any) -> str:
     if not isinstance(attribute, bytes):
         return str(attribute)
     try:
-        return attribute.decode("utf-8")
+        return attribute.decode()
     except UnicodeDecodeError:
         return attribute.decode("latin-1")
 
@@ -72,14 +72,16 @@ def opened_netcdf(path: Path, group: str | None) -> xr.Dataset:
     what = "NetCDF or HDF5: cut off, damaged or of another kind"
     with decoding(path, what, "Copy or download it again."), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
-        how: dict[str, Any] = {"engine": "scipy"}
-        source: Path | io.BytesIO = path
         if classic:  # of a damaged file that it maps, scipy leaves the file open
-            source = io.BytesIO(path.read_bytes())
-        else:
-            how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
-        with xr.open_dataset(source, decode_times=False, **how) as opened:
-            return opened.load()
+            content = io.BytesIO(path.read_bytes())
+            return xr.load_dataset(content, decode_times=False, engine="scipy")
+        return xr.load_dataset(
+            path,
+            decode_times=False,
+            engine="h5netcdf",
+            group=_group(path, group),
+            phony_dims="sort",
+        )
 
 
 def _group(path: Path, wanted: str | None) -> str | None:
@@ -93,7 +95,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
             parent = name.rpartition("/")[0]
             holding[parent] = holding.get(parent, 0) + 1
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(path) as file:
         file.visititems(look)
         listed = ", ".join(f"'{name}' ({count} sets)" for name, count in holding.items() if name)
         if wanted is not None and not isinstance(file.get(wanted), h5py.Group):

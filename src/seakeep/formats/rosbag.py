@@ -98,12 +98,10 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     """The one topic whose messages hold numbers; an error that lists them if there are more."""
     types = {}
     for connection in connections:
+        kind = connection.msgtype
         first = next(iter(reader.messages([connection])), None)
-        if not first:
-            continue
-        message = reader.deserialize(first[2], connection.msgtype)
-        if next(_flat(message, ""), None):
-            types[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
+        if first and next(_flat(reader.deserialize(first[2], kind), ""), None):
+            types[connection.topic] = f"{kind}, {connection.msgcount}"
     if not types:
         topics = ", ".join(sorted({connection.topic for connection in connections})) or "none"
         raise DataError(f"{path} holds no messages with numbers (topics: {topics}). Record again.")

@@ -108,11 +108,8 @@ def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
             )
         return groups[wanted]
     filled = {name: channels for name, channels in groups.items() if channels}
-    sampled = {
-        (len(channel), channel.properties.get("wf_increment"))
-        for channels in filled.values()
-        for channel in channels
-    }
+    every = [channel for channels in filled.values() for channel in channels]
+    sampled = {(len(channel), channel.properties.get("wf_increment")) for channel in every}
     if len(filled) > 1 and len(sampled) > 1:
         listed = ", ".join(
             f"'{name}' ({len(channels)} channels of {len(channels[0])})"
@@ -121,7 +118,7 @@ def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
         raise RequestError(
             f"{path} holds several groups that are sampled differently: {listed}. {WHICH}"
         )
-    return [channel for channels in filled.values() for channel in channels]
+    return every
 
 
 def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | None:

@@ -75,6 +75,6 @@ def warn_of_runs(runs: Iterable[xr.Dataset], channels: Collection[str]) -> None:
     SeakeepWarning
         One per channel and kind of finding; gaps that were bridged do no harm.
     """
-    findings = (each for run in runs for each in findings_of(run))
-    harmful = (each for each in findings if each.kind is not samples.SamplesKind.BRIDGED)
-    warn_of(harmful, set(), channels)
+    harmless = samples.SamplesKind.BRIDGED
+    found = (each for run in runs for each in findings_of(run) if each.kind is not harmless)
+    warn_of(found, set(), channels)

@@ -103,8 +103,9 @@ def clocks(record: Record) -> Findings:
     for name, group in record.groups.items():
         label, clock, step = name or "time", record.clocks.get(name, Clock()), step_of(group)
         if gaps := group.attrs.get("time_gaps"):
-            missing = group.attrs["time_missing"]
-            yield record.finding(ClocksKind.TIME_GAPS, label, gaps=gaps, missing=missing)
+            yield record.finding(
+                ClocksKind.TIME_GAPS, label, gaps=gaps, missing=group.attrs["time_missing"]
+            )
         if jitter := group.attrs.get("time_jitter_rms"):
             yield record.finding(ClocksKind.JITTER, label, jitter, unit="s", jitter=1e3 * jitter)
         if rate := record.rates.get(name):
@@ -121,8 +122,9 @@ def clocks(record: Record) -> Findings:
                 ClocksKind.UNCERTAIN_CLOCK, label, error, limit, "s", described=clock.describe()
             )
         if abs(clock.drift) > LARGEST_DRIFT:
-            drift, limit = 1e6 * clock.drift, 1e6 * LARGEST_DRIFT
-            yield record.finding(ClocksKind.CLOCK_DRIFT, label, drift, limit, "1")
+            yield record.finding(
+                ClocksKind.CLOCK_DRIFT, label, 1e6 * clock.drift, 1e6 * LARGEST_DRIFT, "1"
+            )
 
 
 def rates(record: Record) -> Findings:

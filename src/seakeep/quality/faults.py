@@ -144,7 +144,7 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
 
 def _bursts(x: FloatArray) -> BoolArray:
     """Samples between readings that are entered and left in opposite steps that no wave takes."""
-    steps, out = np.diff(x), np.zeros(x.size, dtype=bool)
+    steps, out = np.diff(x), np.zeros(x.size, bool)
     if not steps.any():
         return out
     wild = np.abs(steps) > WILD * np.percentile(np.abs(steps[steps != 0]), 80)
@@ -240,7 +240,7 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     x = as_series(series)
     step = time_step(dt)
     other = None if witness is None else as_series(witness)
-    out = np.zeros(x.size, dtype=bool)
+    out = np.zeros(x.size, bool)
     starts = _starts(x)
     if starts.size < 2:
         return out
@@ -304,7 +304,7 @@ def saturated(series: FloatArray, stuck: BoolArray) -> BoolArray:
     >>> bool(saturated(x, find_held(x, 0.1)).sum() == (x == 0.8).sum())
     True
     """
-    out = np.zeros(series.size, dtype=bool)
+    out = np.zeros(series.size, bool)
     for edge in (series.max(), series.min()):
         plateaus = stuck & (series == edge)
         if len(stretches(plateaus)) > 1:

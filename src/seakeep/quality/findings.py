@@ -154,7 +154,7 @@ def warn_of(
     """
     every = list(findings)
     for each in every:
-        wanted = bool(each.kind.remedy) if channels is None else each.channel in channels
+        wanted = each.kind.remedy if channels is None else each.channel in channels
         if not wanted or (each.channel, each.kind.name) in reported:
             continue
         alike = [e for e in every if each.kind.together and e.kind is each.kind]

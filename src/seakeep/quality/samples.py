@@ -94,9 +94,8 @@ def flagged(record: Record) -> Findings:
         flags, dt = group.variables[f"{name}_flags"].values, step_of(group)
         for bit, kind in _FLAGS.items():
             hit = (flags & bit) > 0
-            if not hit.any():
+            if not (parts := stretches(hit)):
                 continue
-            parts = stretches(hit)
             inner = [(end - begin) * dt for begin, end in parts if begin > 0 and end < hit.size]
             done = ""
             if bit == OUTLIER and (flags & REPLACED).any():

@@ -93,7 +93,7 @@ def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreem
         for name in others:
             stuck = None
             if f"{name}_flags" in run.coords:
-                stuck = (run[f"{name}_flags"].values & STUCK) > 0
+                stuck = run[f"{name}_flags"].values & STUCK
             step = run[name].attrs.get("reading_step", np.nan)
             out[name, first] = compare_sensors(filled(run[name]), trusted, dt, window, stuck, step)
     return out
@@ -152,7 +152,7 @@ def derivatives(record: Record) -> Findings:
     """Rates and accelerations of another sign or scale than the motion they belong to."""
     run, dt, count = record.whole, step_of(record.whole), record.whole.sizes["time"]
     frequency = np.fft.rfftfreq(count, dt)
-    for motion, (order, (suffix, words)) in product(MOTIONS, enumerate(DERIVED, start=1)):
+    for motion, (order, (suffix, words)) in product(MOTIONS, enumerate(DERIVED, 1)):
         name = motion + suffix
         if name in TILTED or not {motion, name} <= {*run.data_vars}:
             continue
@@ -326,7 +326,7 @@ def compare_sensors(
     gain = 0.0 if gain < 1e-6 else gain  # what resampling makes of a constant
     nothing = Agreement(period, np.nan, step, *(np.nan,) * 5, gain, empty, empty)
     length = 4 * period if window is None else window
-    if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
+    if not 0 < gain < np.inf or x.size * dt < length + period:
         return nothing
     stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
 

@@ -55,19 +55,17 @@ def lowpass_taps(
             f"passband {passband:g} Hz, stopband {stopband:g} Hz, half the sampling rate "
             f"{sampling_rate / 2:g} Hz. Lower the edges, or filter before resampling."
         )
-    edges = (passband / sampling_rate, stopband / sampling_rate)
+    low, high = passband / sampling_rate, stopband / sampling_rate
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
-        count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
+        count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (high - low))
         count += 1 - count % 2
-        taps = scipy.signal.firwin(
-            count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
-        )
+        taps = scipy.signal.firwin(count, (low + high) / 2, window=("kaiser", beta), fs=1.0)
         # Distances of the gain from one in the pass band and from zero in the stop band.
         points = 64 * taps.size
         gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
-        at_edges = np.abs(scipy.signal.freqz(taps, worN=edges, fs=1.0)[1])
-        passing = np.append(gain[frequency <= edges[0]], at_edges[0])
-        stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
+        at_low, at_high = np.abs(scipy.signal.freqz(taps, worN=(low, high), fs=1.0)[1])
+        passing = np.append(gain[frequency <= low], at_low)
+        stopped = np.append(gain[frequency >= high], at_high)
         if max(np.abs(passing - 1).max(), stopped.max()) <= 10 ** (-attenuation / 20):
             break
     return taps
@@ -132,7 +130,7 @@ def low_pass(
     edge = 1.25 * passband if stopband is None else stopband
     taps = lowpass_taps(1.0 / time_step(dt), passband, edge, attenuation)
     extended = odd_extension(array, taps.size // 2)  # so that length and phase are unchanged
-    columns = taps.reshape((-1,) + (1,) * (array.ndim - 1))
+    columns = taps.reshape(-1, *[1] * (array.ndim - 1))
     return scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
 
 
@@ -203,7 +201,7 @@ def resample(
 
     # The lower one, in cycles per old sample.
     nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
-    return _sinc_sums(array, position, (PASSBAND * nyquist, nyquist), attenuation)
+    return _sinc_sums(array, position, nyquist, attenuation)
 
 
 PHASES = 256
@@ -213,16 +211,17 @@ AT_ONCE = 500_000
 
 
 def _sinc_sums(
-    array: FloatArray, position: FloatArray, edges: tuple[float, float], attenuation: float
+    array: FloatArray, position: FloatArray, nyquist: float, attenuation: float
 ) -> FloatArray:
     """Low-passed values of a series between its samples.
 
-    `position` counts in old samples; `edges`, of the pass and stop bands, are cycles per sample.
+    `position` counts in old samples; what lies above `nyquist` (cycles per sample) is stopped.
     """
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
-    width = edges[1] - edges[0]
+    passed = PASSBAND * nyquist
+    width = nyquist - passed
     half = math.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1)  # by Kaiser's formula
-    bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
+    bank = _kernels(half, 0.1102 * (attenuation - 8.7), passed + nyquist)
     base = np.floor(position).astype(int)
     place = (position - base) * PHASES
     phase = np.minimum(place.astype(int), PHASES - 1)
@@ -266,5 +265,4 @@ def _kernels(half: int, beta: float, band: float) -> FloatArray:
         special.j0(beta * np.sqrt(np.maximum(-inside, 0.0))),
     )
     kernels = window * np.sinc(band * lag)
-    kernels /= kernels.sum(axis=1, keepdims=True)
-    return kernels
+    return kernels / kernels.sum(axis=1, keepdims=True)

@@ -336,7 +336,7 @@ def compare_motion(
         samples=t1.size,
         at_limit=at_limit,
         max_lag=reach,
-        period=float(2.0 * (t1[-1] - t1[0]) / max(crossings, 1)),
+        period=float(2.0 * np.ptp(t1) / max(crossings, 1)),
         rival_lag=rival_lag,
         rival_correlation=rival,
     )

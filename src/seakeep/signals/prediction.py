@@ -210,7 +210,7 @@ class Jumps:
         self.memory[6:] *= np.where(beside, 1.0 - 1.0 / OF_LATE, 1.0)
         squares += np.where(beside, np.minimum(away, 0.5 * JUMP * usual) ** 2, 0.0)
         weight += beside
-        newer = np.array([sample, first, second, np.zeros(sample.size), a, b])
+        newer = [sample, first, second, np.zeros(sample.size), a, b]
         self.memory[:6] = np.where(taken, newer, self.memory[:6])
         return jumps
 
@@ -318,5 +318,4 @@ def predictable_time(series: ArrayLike, dt: float, distance: float, depth: float
     >>> round(predictable_time(wave, 0.05, 2.0, np.inf), 1)  # 2 d ω / g
     1.2
     """
-    edge = 2 * np.pi * band_limit(series, dt, QUICKLY)
-    return float(distance / group_speed(edge, depth))
+    return float(distance / group_speed(2 * np.pi * band_limit(series, dt, QUICKLY), depth))

@@ -274,8 +274,11 @@ def misplaced_probes(
     Regular waves before a model are left out for a reason: on the measured ship section their
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
-    known = {name: as_series(each) for name, each in elevations.items() if name in positions}
-    telling = {name: series for name, series in known.items() if _telling(series)}
+    telling = {
+        name: series
+        for name, each in elevations.items()
+        if name in positions and _telling(series := as_series(each))
+    }
     names = sorted(telling, key=positions.__getitem__)
     pairs = list(pairwise(names))
     if len(names) > 2:
@@ -369,8 +372,8 @@ def probe_separation(
     smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
     energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
     cross, k = cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
-    period = encounter_period(a, interval)
-    reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
+    omega = 2 * np.pi / encounter_period(a, interval)
+    reach = float(group_speed(omega, depth)) * REACH * a.size * interval
     least = abs(place) + np.pi / k[np.argmax(np.abs(cross))]
     step = 2 * np.pi / k[-1] / PLACES
     most = 0.5 * MOST_PLACES * step
@@ -467,16 +470,16 @@ class CarriedElevation:
 def band_limit(series: ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
     """Frequency below which a given part of a record's variance lies."""
     array = as_series(series, channels=True)
-    flat = array.reshape(array.shape[0], -1)
+    flat = array.reshape(len(array), -1)
     # Tapered, since a wave that the record's end cuts would leak into all frequencies.
-    taper = np.hanning(flat.shape[0] + 2)[1:-1, None]
+    taper = np.hanning(len(flat) + 2)[1:-1, None]
     power = np.abs(fft.rfft(taper * (flat - flat.mean(axis=0)), axis=0)) ** 2
     grown = np.cumsum(power.sum(axis=1))
     if not grown[-1] > 0:
         raise DataError(
             "the elevation is constant: there are no waves in it. Look for a dead probe."
         )
-    frequency = fft.rfftfreq(flat.shape[0], time_step(dt))
+    frequency = fft.rfftfreq(len(flat), time_step(dt))
     return float(frequency[np.searchsorted(grown, share * grown[-1])])
 
 
@@ -549,11 +552,10 @@ def _carried(
             "resample the elevation to some 30 samples per wave period first."
         )
     records = np.empty((count, *flat.shape))
-    nodes = chebyshev.chebpts1(count)
-    for record, node in zip(records, centre + half * nodes, strict=True):
+    for record, node in zip(records, centre + half * chebyshev.chebpts1(count), strict=True):
         carried = fft.irfft(spectrum * np.exp(-1j * k * node)[:, None], n=size, axis=0)
         record[:] = carried[padding : padding + len(flat)]
-    terms = fft.dct(records[::-1], type=2, axis=0) / count
+    terms = fft.dct(records[::-1], axis=0) / count
     terms[0] *= 0.5
     terms[0] += mean
     return CarriedElevation(lowest, highest, terms)
@@ -603,8 +605,8 @@ def mean_spectrum(
     power : ndarray, shape (LINES,)
         Mean over records and probes; they sum to one.
     """
-    top = min(EDGES[1] / period, highest, 0.5 / dt)
-    frequency = np.linspace(EDGES[0] / period, top, LINES)
+    low, high = EDGES
+    frequency = np.linspace(low / period, min(high / period, highest, 0.5 / dt), LINES)
     power = np.zeros(LINES)
     for record in records:
         length = min(len(record), round(16 * period / dt))
@@ -673,8 +675,7 @@ def carriers(
 def slow_position(surge: FloatArray, period: float) -> FloatArray:
     """Surge below ``CUTOFF`` without delay; `period` in samples."""
     sections = signal.butter(4, 2 * CUTOFF / period, output="sos")
-    padding = min(len(surge) - 1, round(SETTLED * period))
-    return signal.sosfiltfilt(sections, surge, padlen=padding)
+    return signal.sosfiltfilt(sections, surge, padlen=min(len(surge) - 1, round(SETTLED * period)))
 
 
 def position_taps(

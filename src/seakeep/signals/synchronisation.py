@@ -282,9 +282,8 @@ def clock_from_shared(
         instants = (c - offset) / rate
         inside = whole & (instants >= t[0] + end) & (instants <= t[-1] - end)
         slope = other(instants[inside], 1)
-        turn = -slope * (c[inside] - centre)
         (shift, stretch), errors, left, gain = _adjusted(
-            a[inside], other(instants[inside]), -slope, turn
+            a[inside], other(instants[inside]), -slope, -slope * (c[inside] - centre)
         )
         offset, rate = float(offset + shift - stretch * centre), float(rate + stretch)
         if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
@@ -352,7 +351,7 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     >>> [f"{1e6 * clock.drift:.0f} {clock.offset:.4f}" for clock in pool_drift([one, other])]
     ['25 0.0995', '25 0.3005']
     """
-    known = [c for c in clocks if np.isfinite(c.drift_error) and c.drift_error > 0]
+    known = [c for c in clocks if 0 < c.drift_error < np.inf]
     if len(known) < 2:
         return list(clocks)
     weights = np.array([c.drift_error**-2 for c in known])

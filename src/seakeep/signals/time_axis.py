@@ -220,8 +220,7 @@ def uniform_step(time: ArrayLike, name: str = "the run") -> float:
     """
     t = check_order(time, name)
     step = float((t[-1] - t[0]) / (t.size - 1))
-    off = np.abs(t - (t[0] + step * np.arange(t.size)))
-    if np.max(off) > _tolerance(t, step):
+    if np.max(np.abs(t - (t[0] + step * np.arange(t.size)))) > _tolerance(t, step):
         raise DataError(_irregularity(t, name))
     # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
     rounded = float(f"{step:.10g}")

@@ -184,7 +184,6 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     long_side, short_side = (np.sqrt(12 * (mean + sign * half)) for sign in (1, -1))
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
-    cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
     return panel | {
         "centroid_x": left + x0 + centre[0],
         "centroid_y": top + y0 + centre[1],
@@ -193,7 +192,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
         "panel_height": short_side,
         "panel_area": area,
         "panel_fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
-        "cut": cut,
+        "cut": min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0],
         **_corners(weights, centre, angle, long_side, short_side),
     }
 
@@ -464,8 +463,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
                 f"the lamp {how.lamp} (x, y, radius) lies outside the picture of {video.path}, "
                 f"{width} × {height} pixels. Correct its place."
             )
-    stop = how.stop
-    if stop and stop >= 0.5 * video.rate:
+    if (stop := how.stop) and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
             f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times "
@@ -616,7 +614,7 @@ def _motions(
         filled[begin:end] = inner and end - begin <= how.bridge * rate + 1e-9
     if filled.any():
         there = np.flatnonzero(good)
-        between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
+        between = scipy.interpolate.PchipInterpolator(there, table[there])
         table[filled] = between(np.flatnonzero(filled))
     if how.passband:
         for begin, end in stretches(good | filled):

@@ -150,8 +150,7 @@ def repeated_waves(records: Mapping[str, ArrayLike], dt: float) -> dict[str, str
     >>> repeated_waves(runs, 0.05)
     {'a': 'a', 'b': 'b', 'again': 'b', 'high': 'high'}
     """
-    series = {name: as_series(each) for name, each in records.items()}
-    parts = {name: x[waves_part(x, dt)] for name, x in series.items()}
+    parts = {n: (x := as_series(each))[waves_part(x, dt)] for n, each in records.items()}
     every = max(int(min(map(_dominant_period, parts.values()), default=1.0) / PER_WAVE), 1)
     parts = {name: x[::every] - x.mean() for name, x in parts.items()}
     groups: dict[str, str] = {}
@@ -367,8 +366,8 @@ def wave_heights(series: ArrayLike, dt: float) -> FloatArray:
     (46, 0.1)
     """
     x = as_series(series)
-    edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
-    return np.array([np.ptp(x[first:last]) for first, last in pairwise(edges)], float)
+    edges = pairwise(np.ceil(zero_up_crossings(x, dt) / dt).astype(int))
+    return np.array([np.ptp(x[first:last]) for first, last in edges], float)
 
 
 def wave_spectrum(
@@ -593,8 +592,7 @@ def noise_floor(series: ArrayLike) -> float:
         return 0.0
     x = scipy.signal.detrend(over_gaps(x))
     taper = np.hanning(x.size)
-    power = np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)
-    return math.sqrt(noise_level(power))
+    return math.sqrt(noise_level(np.abs(np.fft.rfft(x * taper)) ** 2 / np.sum(taper**2)))
 
 
 def noise_level(power: FloatArray) -> float:
@@ -707,10 +705,9 @@ def find_leakage(
     waves = _analytic(record)
     found = []
     repeated = np.zeros(record.size, bool)
-    pool = [as_series(each, minimum=8) for each in training]
-    ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
-    starts = {*range(0, record.size - length + 1, length // 2), record.size - length}
-    for start in sorted(starts):
+    pool = enumerate(as_series(each, minimum=8) for each in training)
+    ready = [(index, _analytic(each)) for index, each in pool if each.size >= length]
+    for start in sorted({*range(0, record.size - length + 1, length // 2), record.size - length}):
         piece = waves[start : start + length]
         for index, reference in ready:
             # Normalised correlation of the piece at each place where it fits whole.
