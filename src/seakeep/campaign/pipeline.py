@@ -88,8 +88,8 @@ from seakeep.toml import in_seconds
 ChannelMap = dict[str, ChannelSettings]
 COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""
-JUMP = 0.9
-"""Part of a turn beyond which neighbouring readings of an angle lie on either side of its zero."""
+JUMP = 0.1
+"""Part of a turn within which a step is a whole turn: an angle was read on either side of zero."""
 MOST_FINER = 8.0
 """Times finer than the fastest logger of a run that its step may be: waves of four samples get the
 32 of the paper's; with times in another unit it is 1000."""
@@ -357,9 +357,8 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
         long_name = long_name_of(name, each.long_name)
         attributes: dict[str, object] = {"units": target, "long_name": long_name}
         if target == "rad":
-            read, values = values, _without_jumps(values)
-            if values is not read:
-                attributes["jumps"] = int(np.sum(np.abs(np.diff(values - read)) > 1))
+            values, jumps = _without_jumps(values)
+            attributes |= {"jumps": jumps} if jumps else {}
         if each.accuracy is not None:
             attributes["accuracy"] = factor * each.accuracy
         variables[name] = ("time", values[records], attributes)
@@ -368,19 +367,22 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
     )
 
 
-def _without_jumps(angles: FloatArray) -> FloatArray:
-    """Angles without jumps of a whole turn, whose mean lies within half a turn of zero.
+def _without_jumps(angles: FloatArray) -> tuple[FloatArray, int]:
+    """Angles without jumps of a whole turn, and how many there were.
 
-    So runs that cross the jump agree with those that do not.
+    The median lies within half a turn of zero, so that runs that jump agree with those that do not.
     """
     known, turn = np.isfinite(angles), 2 * np.pi
-    own = np.unwrap(angles[known], discont=JUMP * turn)
-    own -= turn * round(own.mean() / turn) if own.size else 0.0
-    if np.allclose(own, angles[known]):
-        return angles
-    out = angles.copy()
-    out[known] = own
-    return out
+    if not known.any():
+        return angles, 0
+    steps = np.diff(angles[known]) / turn
+    jumps = np.where(np.abs(np.abs(steps) - 1) < JUMP, np.sign(steps), 0)
+    turns = np.append(0, np.cumsum(jumps))
+    turns += np.round(np.median(angles[known] / turn - turns))
+    if turns.any():
+        angles = angles.copy()
+        angles[known] -= turn * turns
+    return angles, int(np.count_nonzero(jumps))
 
 
 def cleaned(run: Run) -> Run:

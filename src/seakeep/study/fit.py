@@ -18,7 +18,7 @@ from seakeep.conventions import in_waves
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
 from seakeep.models.conditions import disagreements
-from seakeep.models.labelled import mean_period, wave_channel
+from seakeep.models.labelled import elevations, mean_period
 from seakeep.models.settings import Select
 from seakeep.models.specs import left_open
 from seakeep.models.training import until
@@ -340,29 +340,28 @@ def find_repeat(
         that holds it, from ``source_start`` on, s; ``phase`` by which it is turned, rad;
         ``correlation`` of the analytic signals; and all of this in ``words``.
     """
-    channel = wave_channel(test, inputs, name)
-    records = {key: piece[channel].values for key, piece in pieces.items() if channel in piece}
-    if not records:
-        return None
-    series = [*records.values(), test[channel].values]
-    if not all(len(each) >= 8 and np.isfinite(each).all() for each in series):
-        return None
-    if (leakage := find_leakage(series[:-1], series[-1], dt)) is None:
-        return None
-    source = list(records)[leakage.training]
-    start = float(test["time"][0]) + leakage.test_start
-    source_start = float(pieces[source]["time"][0]) + leakage.training_start
-    return {
-        "run": name,
-        "input": channel,
-        "share": leakage.share,
-        "start": start,
-        "source": source,
-        "source_start": source_start,
-        "phase": leakage.phase,
-        "correlation": leakage.correlation,
-        "words": f"the input '{channel}' of {name} repeats training input: "
-        f"{100 * leakage.share:.0f} % of it, such as from t = {start:.4g} s on, is what "
-        f"{source} holds from t = {source_start:.4g} s on, turned by "
-        f"{np.degrees(leakage.phase):z.0f} degrees (correlation {leakage.correlation:.3f}).",
-    }
+    for channel in elevations(test, inputs, name) or inputs:
+        records = {key: piece[channel].values for key, piece in pieces.items() if channel in piece}
+        whole = all(np.all(np.isfinite(each)) for each in (*records.values(), test[channel].values))
+        if not (records and whole) or min(test.sizes["time"], *map(len, records.values())) < 8:
+            continue
+        if (leakage := find_leakage(list(records.values()), test[channel].values, dt)) is not None:
+            source = list(records)[leakage.training]
+            start = float(test["time"][0]) + leakage.test_start
+            source_start = float(pieces[source]["time"][0]) + leakage.training_start
+            return {
+                "run": name,
+                "input": channel,
+                "share": leakage.share,
+                "start": start,
+                "source": source,
+                "source_start": source_start,
+                "phase": leakage.phase,
+                "correlation": leakage.correlation,
+                "words": f"the input '{channel}' of {name} repeats training input: "
+                f"{100 * leakage.share:.0f} % of it, such as from t = {start:.4g} s on, is what "
+                f"{source} holds from t = {source_start:.4g} s on, turned by "
+                f"{np.degrees(leakage.phase):z.0f} degrees "
+                f"(correlation {leakage.correlation:.3f}).",
+            }
+    return None
