@@ -946,8 +946,11 @@ def _draw_member(
     refused = ""
     for redrawn in range(MOST_REDRAWS):
         quantiles = point if point.size and not redrawn else generator.random(len(PRIORS))
-        values = [spec.at(name, float(q)) for name, q in zip(PRIORS, quantiles, strict=True)]
-        drawn = {name: x for name, x in zip(PRIORS, values, strict=True) if x is not None}
+        drawn = {
+            name: x
+            for name, q in zip(PRIORS, quantiles, strict=True)
+            if (x := spec.at(name, float(q))) is not None
+        }
         if wrong := [f"{name} = {x}" for name, x in drawn.items() if not np.isfinite(x)]:
             refused = (
                 f"the last one gave {wrong[0]}. Check the parameters of that prior, or give it "

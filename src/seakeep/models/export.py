@@ -240,16 +240,12 @@ def to_mat(
             "ErrorBound": bound,
             "StateName": _cell([f"balanced {i + 1}" for i in range(order)]),
         }
-    A, B, C, D = system
     labels = [
         each for group in signature.input_map.regressors(signature.input_labels) for each in group
     ]
     means = [signature.input_scale.mean, signature.direct_scale.mean]
     content = {
-        "A": A,
-        "B": B,
-        "C": C,
-        "D": D,
+        **dict(zip("ABCD", system, strict=True)),
         "Ts": signature.dt,
         "Lead": signature.lead_samples,
         "InputOffset": np.concatenate(means)[:, None],

@@ -745,8 +745,8 @@ def regress_varying(
     right: Any = 0.0
     for run, (window, part) in enumerate(zip(data.windows, q, strict=True)):
         system, both = system_of([[x[run]] for x in series], [window], settings), [1.0, part]
-        gram = gram + np.kron(np.outer(both, both), system.whole)
-        right = right + np.kron(both, system.right)
+        gram += np.kron(np.outer(both, both), system.whole)
+        right += np.kron(both, system.right)
     factor = counts.sum() if settings.ridge_scale == "per_snapshot" else 1.0
     ridge = factor * float(settings.ridge)
     parts = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
