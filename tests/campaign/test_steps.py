@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pages import page
 from said import data_error, findings
 from seas import sea
 from small_tank import tank_columns, write_csv
@@ -286,6 +287,30 @@ def test_dates_and_seconds_of_day_are_in_step_over_midnight(tmp_path):
     edit(path, ("[instruments.camera]\n", "[instruments.camera]\ntime = 'time'\n"))
     with data_error("only where no row is lost, leave time out and state sampling_rate"):
         read_campaign(path).prepare()
+
+
+def test_measurements_at_sea_are_made_waves_and_angles_as_the_page_says(tmp_path):
+    t = np.arange(0, 1200, 0.2)
+    jacket, bow_wave, heave = (np.cos(0.6 * t + phase) for phase in (0.0, 0.5, 0.8))
+    pitch, yaw, wind = 0.01 * np.cos(0.6 * t), 0.03 * np.sin(0.02 * t), 0.2 * np.sin(0.1 * t)
+    columns = {
+        "JKT_AIRGAP [m]": 24 - jacket - 0.4 * np.sin(tau * t / 12000),  # with a tide
+        "BOW_AIRGAP [m]": 13.5 + heave + 150 * pitch - bow_wave,
+        "MRU.Heave (down) [m]": -heave,
+        "MRU.Pitch [deg]": np.degrees(pitch),
+        "GYRO_HDG [deg]": np.degrees(-yaw) % 360,
+        "Wind speed [m/s]": 10 + 0 * t,
+        "Wind dir [deg]": np.degrees(wind) % 360,
+    }
+    run = prepared(
+        tmp_path, columns, page("howto/data.md").split("```toml\n")[2].split("```")[0], t
+    )
+    inner = run.isel(time=slice(500, -500))  # a band reaches over the ends
+    at = inner["time"].values
+    assert_allclose(inner["eta_jacket"], np.cos(0.6 * at), atol=1e-2)  # of the tide's ends
+    assert_allclose(run["eta_bow"], bow_wave, atol=1e-5)  # decimals of the file
+    assert_allclose(run["yaw"], yaw, atol=1e-5)  # its sine
+    assert_allclose(run["wind_x"], 100 * np.cos(wind), atol=1e-3)
 
 
 WANDER = sea(5, (0.2, 1.0)).at  # without a period of its own, so that a lag is unique
