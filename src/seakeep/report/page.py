@@ -206,24 +206,24 @@ def inline_picture(png: bytes, words: str) -> Markup:
     return Markup(f'<img alt="{escape(words)}" src="data:image/png;base64,{encoded}">')
 
 
+@figure_style()
 def _drawn(page: tuple[Sequence[Drawing], Path], number: int) -> Markup:
     """Draw a figure, write its files, and return it as an element of the page."""
+    import matplotlib as mpl
+
     drawings, folder = page
     drawing = drawings[number]
+    figure = drawing.draw()
+    engine = figure.get_layout_engine()
+    if engine:  # laid out once, not again for each file
+        engine.execute(figure)
+        # Without any engine; "none" stands for one, for which each file would be drawn twice.
+        figure.set_layout_engine(None)
+    save_figure(figure, folder / f"{drawing.name}.png")
     name, label, buffer = drawing.name, f"title-{drawing.name}", io.StringIO()
-    with figure_style():
-        import matplotlib as mpl
-
-        figure = drawing.draw()
-        engine = figure.get_layout_engine()
-        if engine:  # laid out once, not again for each file
-            engine.execute(figure)
-            # Without any engine; "none" stands for one, for which each file would be drawn twice.
-            figure.set_layout_engine(None)
-        save_figure(figure, folder / f"{name}.png")
-        # Letters are shapes, so that it looks the same wherever it is opened.
-        with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
-            figure.savefig(buffer, format="svg", metadata={"Date": None})
+    # Letters are shapes, so that it looks the same wherever it is opened.
+    with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
     # A tenth of a point is all that can be seen, and half of the file.
     shorten = re.compile(r"(\.\d)\d+")
     text = re.sub(r' d="[^"]*"', lambda path: shorten.sub(r"\1", path[0]), buffer.getvalue())
