@@ -175,9 +175,8 @@ def processes(workers: int) -> Iterator[Executor]:
 
 def _start_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    if (
-        parent := multiprocessing.parent_process()
-    ):  # a parent that was killed leaves no worker behind
+    parent = multiprocessing.parent_process()
+    if parent:  # a parent that was killed leaves no worker behind
         sentinel = parent.sentinel
         threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
 

@@ -150,11 +150,8 @@ def judge_runs(runs: Datasets) -> list[str]:
 
 def _seen(runs: Datasets, first: str, second: str) -> dict[str, _Seen]:
     """What two probes saw in each run in which both move."""
-    pairs = {
-        name: pair
-        for name, run in runs.items()
-        if all(map(np.ptp, pair := [filled(run[each]) for each in (first, second)]))
-    }
+    pairs = {name: [filled(run[each]) for each in (first, second)] for name, run in runs.items()}
+    pairs = {name: pair for name, pair in pairs.items() if all(map(np.ptp, pair))}
     waves = {name: _waves(runs[name], *pair) for name, pair in pairs.items()}
     lengths = [pairs[name][0].size // 2 for name in pairs if waves[name] >= FEWEST_WAVES]
     out = {}

@@ -130,7 +130,7 @@ def low_pass(
     edge = 1.25 * passband if stopband is None else stopband
     taps = lowpass_taps(1.0 / time_step(dt), passband, edge, attenuation)
     extended = odd_extension(array, taps.size // 2)  # so that length and phase are unchanged
-    columns = taps.reshape(-1, *[1] * (array.ndim - 1))
+    columns = taps.reshape((-1,) + (1,) * (array.ndim - 1))
     return scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
 
 

@@ -282,8 +282,9 @@ def clock_from_shared(
         instants = (c - offset) / rate
         inside = whole & (instants >= t[0] + end) & (instants <= t[-1] - end)
         slope = other(instants[inside], 1)
+        turn = -slope * (c[inside] - centre)
         (shift, stretch), errors, left, gain = _adjusted(
-            a[inside], other(instants[inside]), -slope, -slope * (c[inside] - centre)
+            a[inside], other(instants[inside]), -slope, turn
         )
         offset, rate = float(offset + shift - stretch * centre), float(rate + stretch)
         if abs(shift) < 1e-9 and abs(stretch) < 1e-12:

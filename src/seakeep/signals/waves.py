@@ -150,7 +150,8 @@ def repeated_waves(records: Mapping[str, ArrayLike], dt: float) -> dict[str, str
     >>> repeated_waves(runs, 0.05)
     {'a': 'a', 'b': 'b', 'again': 'b', 'high': 'high'}
     """
-    parts = {n: (x := as_series(each))[waves_part(x, dt)] for n, each in records.items()}
+    series = {name: as_series(each) for name, each in records.items()}
+    parts = {name: x[waves_part(x, dt)] for name, x in series.items()}
     every = max(int(min(map(_dominant_period, parts.values()), default=1.0) / PER_WAVE), 1)
     parts = {name: x[::every] - x.mean() for name, x in parts.items()}
     groups: dict[str, str] = {}
@@ -707,7 +708,8 @@ def find_leakage(
     repeated = np.zeros(record.size, bool)
     pool = enumerate(as_series(each, minimum=8) for each in training)
     ready = [(index, _analytic(each)) for index, each in pool if each.size >= length]
-    for start in sorted({*range(0, record.size - length + 1, length // 2), record.size - length}):
+    starts = {*range(0, record.size - length + 1, length // 2), record.size - length}
+    for start in sorted(starts):
         piece = waves[start : start + length]
         for index, reference in ready:
             # Normalised correlation of the piece at each place where it fits whole.
