@@ -353,3 +353,16 @@ def conversion(unit: str, target: str, channel: str = "the channel") -> float:
             "Correct the unit, or map the column to another channel."
         )
     return float(f"{_registry().convert(1.0, source, goal):.15g}")
+
+
+def same_unit(one: str, other: str) -> bool:
+    """Whether two texts say the same unit, however it is spelled."""
+    try:
+        return one == other or conversion(one, other) == 1.0
+    except RequestError:  # one is not known, or they measure different things
+        return False
+
+
+def is_load(units: str) -> bool:
+    """Whether a channel is a force, with or without a prefix, by its unit."""
+    return units.endswith("N")

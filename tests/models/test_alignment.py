@@ -45,7 +45,7 @@ def test_a_measured_surge_in_other_units_than_metres_is_refused(models, drifts, 
     """Also where it is no state, whose unit the model knows."""
     in_mm = [run.assign(surge=(1000 * run["surge"]).assign_attrs(units="mm")) for run in drifts]
     model = models[key].settings.fit(drifts, ["heave"], INPUTS)
-    message = r"'surge' of run is in 'mm'; 'm' is expected\. Convert it and its units attribute\."
+    message = r"channel 'surge' of run is in 'mm' and the model expects 'm'\. Convert"
     with data_error(message):
         model.settings.fit(in_mm, ["heave"], INPUTS)
     with data_error(message):

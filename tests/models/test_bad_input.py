@@ -29,7 +29,9 @@ def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run):
 
 def test_times_that_state_another_unit_than_seconds_are_refused(model, run):
     run["time"].attrs["units"] = "ms"
-    message = r"'time' of run is in 'ms'; 's' is expected\. Convert it and its units attribute\."
+    message = (
+        r"channel 'time' of run is in 'ms' and the model expects 's'\. Convert the channel and"
+    )
     with data_error(message):
         fit(run)
     with data_error(message):

@@ -7,11 +7,10 @@ import pytest
 from drifting import FOLLOWED, INPUTS, OBSERVABLES, STATES, heave_error
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
-from said import warned
+from said import data_error, warned
 
 from seakeep import HankelDMDc
 from seakeep.core.recursion import Place, Recursion, recursion
-from seakeep.errors import DataError
 from seakeep.models.calibration import envelope_of
 from seakeep.models.labelled import Span
 
@@ -53,13 +52,12 @@ def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
 
 def test_a_surge_in_other_units_than_metres_is_refused(drifts):
     far = [run.assign(surge=run["surge"] * 1000.0) for run in drifts]
-    with pytest.raises(
-        DataError,
-        match=r" 1200 m in training, 2[0-9]{2} wavelengths\. Check that 'surge' is in metres",
+    with data_error(
+        r" 1200 m in training, 2[0-9]{2} wavelengths\. Check that 'surge' is in metres"
     ):
         SPEC.fit(far, STATES, INPUTS)
     stated = [run.assign(surge=run["surge"].assign_attrs(units="cm")) for run in drifts]
-    with pytest.raises(DataError, match=r"'surge' of run is in 'cm'; 'm' is expected\. Convert"):
+    with data_error("channel 'surge' of run is in 'cm' and the model expects 'm'"):
         SPEC.fit(stated, STATES, INPUTS)
 
 

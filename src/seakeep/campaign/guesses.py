@@ -28,11 +28,12 @@ from seakeep.conventions import (
     canonical_channel,
     conversion,
     is_elevation,
+    same_unit,
     si_unit,
 )
 from seakeep.errors import DataError
 from seakeep.formats import Columns
-from seakeep.formats.columns import is_unit, named_unit, same_unit
+from seakeep.formats.columns import is_unit, named_unit
 from seakeep.quality.faults import noise_share
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, past_midnight, stretches

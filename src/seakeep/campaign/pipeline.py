@@ -44,10 +44,10 @@ from seakeep.campaign.settings import (
     sources_of,
     units_of,
 )
-from seakeep.conventions import MOTIONS, conversion
+from seakeep.conventions import MOTIONS, conversion, same_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean, naming
 from seakeep.formats import Columns, read_columns
-from seakeep.formats.columns import is_unit, meant_column, same_unit
+from seakeep.formats.columns import is_unit, meant_column
 from seakeep.quality import Finding, Rate, Record, Redundant, check
 from seakeep.quality.faults import (
     BRIDGED,

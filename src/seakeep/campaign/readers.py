@@ -11,11 +11,11 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.campaign.settings import FileSettings
-from seakeep.conventions import conversion, si_unit
+from seakeep.conventions import conversion, same_unit, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
 from seakeep.formats import Columns, folder_reader, read_columns
-from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
+from seakeep.formats.columns import is_unit, meant_column, named_unit
 from seakeep.signals.time_axis import DAY, check_order, instant_text, past_midnight, usual_step
 from seakeep.toml import packaged
 

@@ -16,6 +16,7 @@ from scipy import optimize, stats
 
 from seakeep.arrays import TINY, Datasets, FloatArray
 from seakeep.check.parts import Known, deviations, free_runs, irregular, judged, units_of
+from seakeep.conventions import is_load
 from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.errors import SeakeepError
 from seakeep.models import Model
@@ -82,7 +83,7 @@ def statistics(
     parts, units = [], units_of(model, model.states)
     for column, state in enumerate(model.states):
         noise = [waves[name][state].attrs.get("noise_std", 0.0) for name in known]
-        laws, known_below = [], np.nan if units[column].endswith("N") else 1.0
+        laws, known_below = [], np.nan if is_load(units[column]) else 1.0
         for of_kind in moved.values():
             above, below = (
                 _law([side * x[:, column] for x in of_kind], noise, model.dt, duration)

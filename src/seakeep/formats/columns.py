@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from seakeep.arrays import FloatArray
-from seakeep.conventions import conversion, si_unit
+from seakeep.conventions import si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
 from seakeep.toml import Table, packaged
 
@@ -98,14 +98,6 @@ def is_unit(text: str) -> bool:
     except RequestError:
         return False
     return True
-
-
-def same_unit(one: str, other: str) -> bool:
-    """Whether two texts say the same unit, however it is spelled."""
-    try:
-        return conversion(one, other) == 1.0
-    except RequestError:  # one is not known, or they measure different things
-        return one == other
 
 
 def split_unit(header: str) -> tuple[str, str | None]:

@@ -15,8 +15,9 @@ import numpy as np
 import pandas as pd
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import same_unit
 from seakeep.errors import DataError, warn
-from seakeep.formats.columns import Columns, Options, is_unit, same_unit, unique_names
+from seakeep.formats.columns import Columns, Options, is_unit, unique_names
 
 HEAD = 40
 """Lines that may stand above a header, and from which the layout is recognised."""

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
-from seakeep.conventions import displayed
+from seakeep.conventions import displayed, is_load
 from seakeep.errors import DataError, RequestError, quiet, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
@@ -92,7 +92,7 @@ class Disagreement:
         factor, units = displayed(self.units)
         units = f" {units}" if units not in ("", "1") else ""
         value, remedy = factor * self.value, "Correct its zero"
-        if self.channel in DRIFTING or self.units == "N":
+        if self.channel in DRIFTING or is_load(self.units):
             remedy = (
                 "Of a moored vessel that may be real drift: give the model what drives it, such as "
                 "a wind or observables = [{ kind = 'slow_squares', of = … }] in [model]. Else "

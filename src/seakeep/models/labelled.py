@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, Groups
-from seakeep.conventions import canonical_channel, conversion, is_elevation
+from seakeep.conventions import canonical_channel, is_elevation, same_unit
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
@@ -131,13 +131,12 @@ def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float
 
 
 def check_units(run: xr.Dataset, channel: str, expected: str, name: str) -> None:
-    """Refuse a channel that states another unit than the one expected, however it is spelt."""
-    stated, called = run.variables[channel].attrs.get("units", ""), f"'{channel}' of {name}"
-    units = str(stated).partition(" since ")[0]
-    if units not in ("", expected) and conversion(units, expected, called) != 1.0:
+    """Refuse a channel that states another unit than a model expects, however it is spelt."""
+    units = str(run.variables[channel].attrs.get("units", "")).partition(" since ")[0]
+    if units and not same_unit(units, expected):
         raise DataError(
-            f"{called} is in '{units}'; '{expected}' is expected. Convert it and its units "
-            "attribute."
+            f"channel '{channel}' of {name} is in '{units}' and the model expects '{expected}'. "
+            "Convert the channel and its units attribute."
         )
 
 
@@ -155,14 +154,9 @@ def opened(
     for label in labels:
         if label.name not in variables or not label.units:
             continue
-        units = variables[label.name].attrs.get("units")
-        if not units:
+        if not variables[label.name].attrs.get("units"):
             silent.append(label)
-        elif str(units) != label.units:
-            raise DataError(
-                f"channel '{label.name}' of {name} is in '{units}' and the model expects "
-                f"'{label.units}'. Convert the channel and its units attribute."
-            )
+        check_units(run, label.name, label.units, name)
     if silent:
         listed = ", ".join(f"'{label.name}'" for label in silent)
         units = ", ".join(dict.fromkeys(f"'{label.units}'" for label in silent))

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from seakeep.arrays import FloatArray, as_table, check_choice
-from seakeep.conventions import MOTIONS
+from seakeep.conventions import MOTIONS, is_load
 from seakeep.core.readouts import LoadMap
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.models.labelled import ChannelLabel
@@ -123,7 +123,7 @@ def motions_of(states: Sequence[ChannelLabel], channel: str) -> list[int]:
 def readouts_asked(readouts: ReadOuts, states: Sequence[ChannelLabel]) -> dict[str, Asked]:
     """Kinds by channel of a model with these states; refuses those of what is no state."""
     if isinstance(readouts, str):
-        loads = [label.name for label in states if label.units.endswith("N")]
+        loads = [label.name for label in states if is_load(label.units)]
         return dict.fromkeys(loads if motions_of(states, "") else [], "auto")
     names = [label.name for label in states]
     for channel, _ in readouts:
