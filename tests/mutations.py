@@ -402,6 +402,7 @@ CHANGES = {
         ("if is_elevation(each) or is_probe(each)", "if is_elevation(each)", "models/test_selection.py::test_observables_are_those_of_elevations_of_any_name"),
         ("min(waves or lengths, key=", "max(waves or lengths, key=", "models/test_selection.py::test_periods_are_those_of_the_elevation_farthest_up_wave"),
         ('check_units(run, "time", "s", name)', "pass", "models/test_bad_input.py::test_times_that_state_another_unit_than_seconds_are_refused"),
+        ("{period * expected / step:.7g}", "{period * step / expected:.7g}", "models/test_bad_input.py::test_runs_of_another_step_are_refused"),
     ],
     "models/linear.py": [
         ("-poles.real / natural", "-poles.real / frequency", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
@@ -666,6 +667,8 @@ CHANGES = {
         ('.where(np.isfinite(coverage["width"])).values', ".values", "report/test_comparison_report.py::test_the_band_of_an_ensemble_is_judged_by_hand"),
         ("known.sum(axis=0), np.nan", "len(known), np.nan", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
+        ('origin = float(run["time"][0]) if', "origin = 0.0 if", "study/test_fit.py::test_a_start_with_a_plus_counts_from_the_start_of_each_run"),
+        ("model.read_windows(run, [begin], instants)", "pass", "study/test_fit.py::test_a_gap_in_the_last_test_stops_before_the_first_is_forecast"),
         ("lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_lead_reads_waves_ahead_of_time"),
         ('(factor_of("s")[0] * run[name])', 'run[name]', "signals/test_rigid_body.py::test_full_scale_run"),
         ('{"time", "diverged_at"} & set', '{"time"} & set', "signals/test_rigid_body.py::test_members_are_lost_at_instants_of_full_scale"),

@@ -153,6 +153,12 @@ def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place
     assert float(mean["nrmse"]) == pytest.approx(1.0, abs=0.01)
 
 
+def test_what_a_forecast_refuses_stops_before_baselines_are_fitted(run, monkeypatch):
+    monkeypatch.setattr("seakeep.study.fit_baselines", None)
+    _, err = run(f"compare model.nc {CAMPAIGN} --baselines --start 900", 2)
+    assert "start = 900 s is outside unseen" in err
+
+
 MISTAKES = {
     "fit missing.toml -o m.nc": r"missing\.toml does not exist\..* Draft one with",
     f"fit {CAMPAIGN} -o m.nc --model sway": r"no table \[models\.sway\]",

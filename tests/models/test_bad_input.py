@@ -132,7 +132,8 @@ def test_runs_of_another_step_are_refused(model, run):
     message = r"time step of 0\.1 s and the model one of 0\.05 s\. Resample"
     with data_error(message):
         fit([run, coarse])
-    with data_error(message):
+    coarse.attrs["encounter_period"] = 2.5  # of 25 steps: with those of the model it is 1.25 s
+    with data_error(rf"{message}.* encounter_period = 1\.25 in \[campaign\]"):
         model.forecast(coarse, start=5.0, steps=5)
 
 

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 import xarray as xr
 from numpy.random import default_rng
+from numpy.testing import assert_allclose
 from oscillators import arx_run
-from said import request_error, warned
+from said import data_error, request_error, warned
 from scipy import signal
 from seas import sea
 from small_tank import write_csv
@@ -21,6 +22,7 @@ from seakeep import SeakeepWarning
 from seakeep.campaign import write_prepared
 from seakeep.models import KINDS
 from seakeep.study import compare, comparison_table, fit_campaign
+from seakeep.study.comparison import calibration_parts
 from seakeep.study.fit import find_repeat
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*shows waves of")  # of unit size
@@ -81,6 +83,35 @@ def test_runs_that_train_and_test_apart(halves):
     alone = campaign(halves, EXACT, train)
     with request_error("no run of the campaign tests a model"):
         compare(fit_campaign(alone), alone)
+
+
+def test_a_start_with_a_plus_counts_from_the_start_of_each_run(halves):
+    train = '[runs.a]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
+    tests = (
+        f'[runs.{n}]\nfile = "run.csv"\nspan = [{s}, {s + 50.0}]\nrole = "test"\n'
+        for n, s in (("b", 100.0), ("c", 150.0))
+    )
+    whole = campaign(halves, EXACT, train + "".join(tests))
+    model = fit_campaign(whole)
+    judged = compare(model, whole, start="+20")
+    assert [each.start for each in judged] == [120.0, 170.0]
+    parts = calibration_parts(whole, whole.prepare(names=["b", "c"]), model.dt, "+20", "+25")
+    times = [part["time"].values[[0, -1]].tolist() for part in parts.values()]
+    assert_allclose(times, [[120.0, 125.0], [170.0, 175.0]])
+
+
+def test_a_gap_in_the_last_test_stops_before_the_first_is_forecast(halves):
+    table = pd.read_csv(halves / "run.csv")
+    table.loc[1500:1540, "eta [m]"] = np.nan
+    table.to_csv(halves / "gap.csv", index=False)
+    train = '[runs.a]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
+    test = '[runs.{0}]\nfile = "{0}.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
+    runs = train + test.format("run") + test.format("gap") + "\n[preparation]\ngaps = 'mask'\n"
+    whole = campaign(halves, EXACT, runs)
+    model = fit_campaign(whole)
+    object.__setattr__(model, "forecast", None)
+    with warned("eta_fwd missing"), data_error("'eta_fwd' of gap has 41 missing"):
+        compare(model, whole)
 
 
 def test_a_state_that_was_not_measured_is_named(halves):

@@ -77,7 +77,10 @@ def forecast(
     run: Annotated[str, Option(help="Name of the run.")],
     start: Annotated[
         str,
-        Option(help="Instant of the last measured state, s or encounter periods such as '20 T'."),
+        Option(
+            help="Instant of the last measured state, s or encounter periods such as '20 T'; "
+            "'+300' is 300 s after the start of the run."
+        ),
     ],
     out: Annotated[Path, Option("-o", "--out", help="Result: .nc or .csv.")],
     steps: Steps = None,
@@ -134,7 +137,7 @@ def forecast(
     band_options = _band({str(model): identified}, level, band, scheduler, members)
     channels = [*identified.states, *identified.inputs]
     prepared = load_prepared(read, names=[run], channels=channels)[run]
-    first = instant_of(start, read, [prepared], "--start")
+    first = instant_of(start, read, prepared, "--start")
     if not isfinite(first):
         raise RequestError(f"--start: received {start[:20]!r}. Give an instant within the run, s.")
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
@@ -180,8 +183,9 @@ def compare(
     start: Annotated[
         str | None,
         Option(
-            help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
-            "default the first possible one in waves."
+            help="Instant of the last measured state, s or encounter periods such as '20 T'; "
+            "'+300' is 300 s after the start of each run; by default the first possible one in "
+            "waves."
         ),
     ] = None,
     steps: Steps = None,
@@ -235,7 +239,7 @@ def compare(
         write_differences,
     )
     from seakeep.study import compare_models, comparison_table, difference_table
-    from seakeep.study.comparison import served
+    from seakeep.study.comparison import read_tests, served
 
     make_folder(out)
     # Names of model files: their stems, or their paths where two would be the same.
@@ -256,6 +260,9 @@ def compare(
         given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
         refuse(given | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
     if baselines:
+        if not nowcast:
+            with progress_bar("Comparing") as progress:  # what is refused is so before the fits
+                read_tests(fitted, read, runs, start, steps, progress)
         fitted = _with_baselines(fitted, read)
     if nowcast:
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}

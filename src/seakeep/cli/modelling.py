@@ -177,8 +177,9 @@ def calibrate(
     start: Annotated[
         str | None,
         Option(
-            help="First instant used of each run, s or encounter periods such as '20 T'; by "
-            "default the start of its training span, or of the run."
+            help="First instant used of each run, s or encounter periods such as '20 T'; '+300' is "
+            "300 s after the start of each run; by default the start of its training span, or of "
+            "the run."
         ),
     ] = None,
     stop: Annotated[

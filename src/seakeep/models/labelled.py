@@ -123,10 +123,17 @@ def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float
     check_units(run, "time", "s", name)
     step = uniform_step(run.variables["time"].values, name)
     if expected is not None and abs(step - expected) > 1e-4 * expected:
-        raise DataError(
+        words = (
             f"{name} has a time step of {step:.6g} s and the model one of {expected:.6g} s. "
             "Resample the run (seakeep.signals.resample, or the campaign's [preparation])."
         )
+        if period := run.attrs.get("encounter_period"):
+            words += (
+                f" Where steps count in encounter periods, encounter_period = "
+                f"{period * expected / step:.7g} in [campaign] gives that of the model; left out, "
+                "it is measured, and changes with the runs and their spans."
+            )
+        raise DataError(words)
     return step
 
 

@@ -206,9 +206,10 @@ def compare_models(
     runs : sequence of str, optional
         Runs; by default those that test.
     start : float or str, optional
-        Instant of the last measured state, s or encounter periods (``"20 T"``); by default the
-        first possible one of the run's test span once the waves have come, its delay history
-        read from before the span where the run has it.
+        Instant of the last measured state, s or encounter periods (``"20 T"``), of a text with a
+        plus (``"+300"``) after the start of each run; by default the first possible one of the
+        run's test span once the waves have come, its delay history read from before the span
+        where the run has it.
     steps : int or str, optional
         Number of instants, or a length (``"15 T"``); by default to the end of the test span, or
         as far as the waves are measured that the models look ahead to.
@@ -242,32 +243,13 @@ def compare_models(
     SeakeepWarning
         If an input of a test run repeats what the model was trained on.
     """
-    wanted = list(runs) or campaign.test_runs
-    if not wanted:
-        raise RequestError(
-            "no run of the campaign tests a model. Name one with --run, or give one "
-            "role = 'test' or a span test = [start, end]."
-        )
-    check_alike(models)
-    used = list(dict.fromkeys(c for m in models.values() for c in (*m.states, *m.inputs)))
-    prepared = load_prepared(campaign, names=wanted, progress=progress, channels=used)
-    for name, run in prepared.items():
-        check_channels(run, used, name)
-    known_runs = list(prepared.values())
-    first = None if start is None else instant_of(start, campaign, known_runs, "start")
-    history = max(model.history_samples for model in models.values())
-    lead = max(model.signature.lead_samples for model in models.values())
+    prepared, windows = read_tests(models, campaign, runs, start, steps, progress)
     compared: dict[str, list[Comparison]] = {}
     for label, model in models.items():
         warn_of_repeats(model, campaign, prepared)
-        dt = model.dt
-        count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
         compared[label] = []
         for name, run in prepared.items():
-            time = run["time"].values
-            at, last = samples_in(run, used, whole_span(run, "test"), dt, history, lead, first)
-            begin = float(time[at]) if first is None else first
-            instants = count or max(last - at, 1)
+            begin, instants = windows[label, name]
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
                 forecast = model.forecast_summary(
@@ -285,6 +267,42 @@ def compare_models(
                     "instant that it forecasts: the model needs them ahead of time."
                 )
     return compared
+
+
+def read_tests(
+    models: Mapping[str, Model],
+    campaign: Campaign,
+    runs: Sequence[str],
+    start: float | str | None,
+    steps: int | str | None,
+    progress: Progress | None = None,
+) -> tuple[Groups, dict[tuple[str, str], tuple[float, int]]]:
+    """Prepared runs; by model and run, the start and the number of instants of its forecast.
+
+    What one of these forecasts would refuse is refused here, before any is made. Arguments and
+    errors as :func:`compare_models`.
+    """
+    wanted = list(runs) or campaign.test_runs
+    if not wanted:
+        raise RequestError(
+            "no run of the campaign tests a model. Name one with --run, or give one "
+            "role = 'test' or a span test = [start, end]."
+        )
+    check_alike(models)
+    used = list(dict.fromkeys(c for m in models.values() for c in (*m.states, *m.inputs)))
+    prepared = load_prepared(campaign, names=wanted, progress=progress, channels=used)
+    history = max(model.history_samples for model in models.values())
+    lead = max(model.signature.lead_samples for model in models.values())
+    windows = {}
+    for (label, model), (name, run) in product(models.items(), prepared.items()):
+        check_channels(run, used, name)
+        first = None if start is None else instant_of(start, campaign, run, "start")
+        count = None if steps is None else samples_of(steps, campaign, [run], model.dt, "steps")
+        span = whole_span(run, "test")
+        at, last = samples_in(run, used, span, model.dt, history, lead, first)
+        windows[label, name] = begin, instants = float(run["time"][at]), count or max(last - at, 1)
+        model.read_windows(run, [begin], instants)
+    return prepared, windows
 
 
 def check_alike(models: Mapping[str, Model]) -> None:
@@ -490,14 +508,13 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     )
 
 
-def instant_of(
-    stated: float | str, campaign: Campaign, runs: Iterable[xr.Dataset], name: str
-) -> float:
-    """Instant in seconds."""
+def instant_of(stated: float | str, campaign: Campaign, run: xr.Dataset, name: str) -> float:
+    """Instant in seconds; a text with a plus, such as "+20", counts from the start of the run."""
+    origin = float(run["time"][0]) if str(stated).startswith("+") else 0.0
     try:
-        return float(stated)
+        return origin + float(stated)
     except (ValueError, OverflowError):
-        return _seconds(str(stated), campaign, runs, name, "seconds such as 20")
+        return origin + _seconds(str(stated), campaign, [run], name, "seconds such as 20")
 
 
 def samples_of(
@@ -643,7 +660,8 @@ def calibration_parts(
     dt : float
         Their time step, s.
     start, stop : str, optional
-        Seconds, or encounter periods such as ``"20 T"``; a stop of ``"inf"`` is the end of all.
+        Seconds, or encounter periods such as ``"20 T"``; with a plus, such as ``"+300"``, after
+        the start of each run; a stop of ``"inf"`` is the end of all.
 
     Returns
     -------
@@ -660,21 +678,26 @@ def calibration_parts(
     for option, stated in (("--start", start), ("--stop", stop)):
         if stated is None:
             continue
-        instant = edges[option] = instant_of(stated, campaign, runs.values(), option)
-        inside = any(begin <= instant <= end for begin, end in spans.values())
+        own = {name: instant_of(stated, campaign, run, option) for name, run in runs.items()}
+        edges[option], instant = own, next(iter(own.values()))
+        inside = any(begin <= own[name] <= end for name, (begin, end) in spans.items())
         if not (inside or (option == "--stop" and instant == math.inf)):
             known = ", ".join(f"{name}: {span_text(*span, dt)}" for name, span in spans.items())
             raise RequestError(
                 f"{option} {stated} ({instant_text(instant, dt)} s) lies in none of the runs "
                 f"({known}). Name an instant inside, or leave {option} out."
             )
-    if len(edges) == 2 and edges["--start"] >= edges["--stop"]:
-        begin, end = (instant_text(edge, dt) for edge in edges.values())
-        raise RequestError(f"--start {start} ({begin} s) lies at or after --stop {stop} ({end} s).")
     parts = {}
     for name, run in runs.items():
         first, last = run.attrs.get("train_span", spans[name])
-        parts[name] = between(run, (edges.get("--start", first), edges.get("--stop", last)))
+        own = {option: instants[name] for option, instants in edges.items()}
+        begin, end = own.get("--start", first), own.get("--stop", last)
+        if len(edges) == 2 and begin >= end:
+            at, until = instant_text(begin, dt), instant_text(end, dt)
+            raise RequestError(
+                f"--start {start} ({at} s) lies at or after --stop {stop} ({until} s)."
+            )
+        parts[name] = between(run, (begin, end))
     return parts
 
 
