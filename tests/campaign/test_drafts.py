@@ -233,6 +233,22 @@ def test_files_of_several_loggers(tmp_path, drafted, pattern, runs):
     assert abs(found) == pytest.approx(0.5, abs=0.01)
 
 
+@pytest.mark.parametrize("pattern", ["{run}/{logger}.csv", "{run}_{logger}.csv"])
+def test_files_that_fit_no_run_or_logger_are_named(tmp_path, drafted, pattern):
+    files = [f for i, run in enumerate(("a1", "a2")) for f in loggers(tmp_path, run, i, pattern)]
+    again = files[-1].with_name(files[-1].name.replace("mru", "mru_sorted"))
+    again.write_bytes(files[-1].read_bytes())
+    if "/" in pattern:
+        with request_error("a2/mru.csv and .*a2/mru_sorted.csv are of one run and have the same"):
+            drafted([*files, again])
+    write_csv(files[-1], {"t": np.arange(99.0), "Line [N]": np.cos(np.arange(99.0))})
+    with request_error("a1.mru.csv and .*a2.mru.csv are called as those of one logger"):
+        drafted(files)
+    if "/" in pattern:
+        with request_error("a1/wave_probes.csv and .*a2/mru.csv have no column in common"):
+            drafted([files[0], files[-1]])
+
+
 @pytest.mark.parametrize("lost", [20, 200])  # of 1001 samples: a channel with gaps, and none
 def test_what_has_long_gaps_is_left_out_with_a_word(drafted, lost):
     columns = tank_columns() | {"WP 2 [mm]": tank_columns()["WP fwd [mm]"]}

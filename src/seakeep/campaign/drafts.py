@@ -4,6 +4,7 @@ import math
 import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from seakeep.campaign.guesses import (
     dead_motions,
     guess_channels,
     is_trigger,
+    misplaced,
+    placings,
     seas_of,
     waves_of_name,
 )
@@ -76,13 +79,24 @@ def draft_campaign(
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         first = read[0]
-        for other in read[1:]:
-            if not set(first.table.names) & set(other.table.names) - {first.time}:
-                raise RequestError(
-                    f"{first.path} and {other.path} have no column in common. Name files of one "
-                    "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
-                    "RUN_LOGGER.csv."
+        by_folder, by_name = placings(read)
+        placed = by_folder if len({file.run for file in by_folder}) > 1 else by_name
+        shared = set(first.table.names) - {first.time}
+        lone = ((placed[0], file) for file in placed[1:] if not shared & set(file.table.names))
+        for one, other in chain(misplaced(placed), lone):
+            why = "have no column in common"
+            if one.run == other.run:
+                why = "are of one run and have the same columns: leave one out"
+            elif one.logger == other.logger:
+                why = (
+                    "are called as those of one logger and differ in their columns: draft without "
+                    "the odd one, then state it as a logger of its own ([runs.NAME.files], and its "
+                    "columns in [runs.NAME.channels])"
                 )
+            raise RequestError(
+                f"{one.path} and {other.path} {why}. Name files of one logger, one per run; or "
+                "those of several loggers as RUN/LOGGER.csv or RUN_LOGGER.csv."
+            )
         mend = "Check delimiter and decimal mark of the file."
         raise RequestError(
             f"{first.path}: no column has numbers that a channel could be made of (columns: "

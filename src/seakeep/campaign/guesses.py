@@ -288,30 +288,29 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
         if not said and (time_step_of(table, time) or 1.0) < SERIAL:
             table.units[time] = "d"
         from_midnight(table, FileSettings(time=time))
-    folders = [_by_folder(path) for path in paths]
-    for keys in (folders, _by_name(files)):
-        placed = [
-            replace(file, run=run, logger=logger)
-            for file, (run, logger) in zip(files, keys, strict=True)
-        ]
-        if _fits(placed):
+    for placed in placings(files):
+        runs, loggers = {file.run for file in placed}, {file.logger for file in placed}
+        one_each = len(runs) == len(files) or "" in runs | loggers
+        if not (one_each or any(misplaced(placed))):
             return placed
-    stems, above = [_stem(path) for path in paths], [folder for folder, _ in folders]
+    stems, above = [_stem(path) for path in paths], [_by_folder(path)[0] for path in paths]
     if len(set(stems)) == 1 < len(set(above)):
         stems = above
     taken: Counter[str] = Counter()
     return [replace(f, run=_free(stem, taken)) for f, stem in zip(files, stems, strict=True)]
 
 
-def _fits(files: Files) -> bool:
-    """Whether no files of one run have like columns, and all files of one logger have."""
-    runs, loggers = {file.run for file in files}, {file.logger for file in files}
-    if len(runs) == len(files) or "" in runs | loggers:
-        return False
-    return not any(
-        one.run == other.run if one.is_like(other) else one.logger == other.logger
-        for one, other in combinations(files, 2)
-    )
+def placings(files: Files) -> Iterator[list[File]]:
+    """Files with the run and logger that their folders say, then with those of their names."""
+    for keys in ([_by_folder(file.path) for file in files], _by_name(files)):
+        yield [replace(f, run=run, logger=at) for f, (run, at) in zip(files, keys, strict=True)]
+
+
+def misplaced(files: Files) -> Iterator[tuple[File, File]]:
+    """Two files each: of one run with like columns, or of one logger with others."""
+    for one, other in combinations(files, 2):
+        if one.run == other.run if one.is_like(other) else one.logger == other.logger:
+            yield one, other
 
 
 def _free(stem: str, taken: Counter[str]) -> str:
