@@ -669,7 +669,7 @@ CHANGES = {
         ("known.sum(axis=0), np.nan", "len(known), np.nan", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
         ('origin = float(run["time"][0]) if', "origin = 0.0 if", "study/test_fit.py::test_a_start_with_a_plus_counts_from_the_start_of_each_run"),
-        ("model.read_windows(run, [begin], instants)", "pass", "study/test_fit.py::test_a_gap_in_the_last_test_stops_before_the_first_is_forecast"),
+        ("model.read_windows(run, [begin], windows[label, name][1])", "pass", "study/test_fit.py::test_a_gap_in_the_last_test_stops_before_the_first_is_forecast"),
         ("lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_lead_reads_waves_ahead_of_time"),
         ('(factor_of("s")[0] * run[name])', 'run[name]', "signals/test_rigid_body.py::test_full_scale_run"),
         ('{"time", "diverged_at"} & set', '{"time"} & set', "signals/test_rigid_body.py::test_members_are_lost_at_instants_of_full_scale"),

@@ -30,8 +30,8 @@ def test_the_others_are_prepared_without_it_and_anew_once_it_is_mended(changed, 
     alone = encounter_period(1e-3 * tank_columns(0)["WP fwd [mm]"], DT)
     assert run.attrs["encounter_period"] == pytest.approx(alone, rel=1e-12)  # unit conversion
     told = findings(run, "LEFT_OUT")
-    assert [each.channel for each in told] == ["run second"]
-    assert "run 'second' is left out of the encounter period" in told[0].text
+    assert [(each.run, each.channel) for each in told] == [("second", "run second")]
+    assert told[0].text.startswith("is left out of the encounter period: ")
     refused, written = RequestError if content is None else DataError, []
     # The others are kept, fresh as long as the damage is the same.
     for work in (write_prepared, load_prepared, write_prepared):
@@ -55,6 +55,7 @@ def test_the_commands(edited, tank, command):
     assert "prepared/first.nc" in out
     assert "second.nc" not in out
     assert "second.csv" in told.split("Error:")[1]
+    assert "Found in second: run second: is left out of the encounter period: " in told
     page = (tank / "prepared" / "quality.html").read_text("utf-8")
     assert re.search(r"<td>second</td><td[^>]*>not prepared</td>", page)
     assert "is left out of the encounter period" in page
@@ -92,6 +93,6 @@ def test_pooled_drifts(tmp_path):
     assert "drift of 2 runs" in left.describe()
     with warned("'three' is left out"):
         run = campaign.prepare(["one"])["one"]
-    assert "run 'three' is left out of the pooled clock drifts" in run.attrs["quality"]
+    assert "is left out of the pooled clock drifts" in run.attrs["quality"]
     with data_error(r"three_mru\.csv"):
         campaign.clocks()

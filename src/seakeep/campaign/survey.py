@@ -164,7 +164,7 @@ def survey(
             lacks = ["the encounter period"] * (name in period_runs)
             lacks += ["the pooled clock drifts"] * (name in clock_runs and name not in clocks)
             left_out[name] = (
-                f"run '{name}' is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
+                f"is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
                 f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
             )
     long = [each for each in counted.values() if each[1] >= FEWEST] or counted.values()
@@ -175,7 +175,7 @@ def survey(
         raise as_one(failures)
     for name, words in left_out.items():
         if name not in asked:
-            warn(words)
+            warn(f"run '{name}' {words}")
     warn_of(chain.from_iterable(doubts.values()), set())
     _settle_drifts(clocks, pools)
     return Survey(settings, files_of, kept, clocks, period, failures, left_out, doubts)

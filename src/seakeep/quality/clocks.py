@@ -6,7 +6,7 @@ import numpy as np
 
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
-from seakeep.quality.findings import Findings, Kind, Record, sound, step_of
+from seakeep.quality.findings import Finding, Findings, Kind, Record, sound, step_of
 from seakeep.signals import Clock
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.time_axis import ASSUMED
@@ -188,4 +188,4 @@ def steps(record: Record) -> Findings:
 def others(record: Record) -> Findings:
     """Runs left out of the pooled period and clocks."""
     for run, words in record.left_out.items():
-        yield record.finding(ClocksKind.LEFT_OUT, f"run {run}", words=words)
+        yield Finding(ClocksKind.LEFT_OUT, run, f"run {run}", details={"words": words})

@@ -60,8 +60,9 @@ class SensorsKind(Kind):
         "is stated to stand {limit:+.3f} from {other}, and the phases of the waves fit "
         "{value:+.3f} (± {spread:.3f} m){unsure}; an elevation carried by the stated distance is "
         "wrong by {error:.2f} of its standard deviation",
-        "Check [rig.positions] of the campaign, the water depth and the probes' clocks. At forward "
-        "speed dispersion does not hold: leave water_depth out of [rig].",
+        "Check [rig.positions] of the campaign, which count along the waves (x times the cosine of "
+        "the angle at which they run), the water depth and the probes' clocks. At forward speed "
+        "dispersion does not hold: leave water_depth out of [rig].",
     )
     NO_POSITION = (
         "is stated to stand {limit:+.3f} from {other}, and at no distance do the phases of the "

@@ -300,8 +300,9 @@ def read_tests(
         count = None if steps is None else samples_of(steps, campaign, [run], model.dt, "steps")
         span = whole_span(run, "test")
         at, last = samples_in(run, used, span, model.dt, history, lead, first)
-        windows[label, name] = begin, instants = float(run["time"][at]), count or max(last - at, 1)
-        model.read_windows(run, [begin], instants)
+        begin = float(run["time"][at]) if first is None else first
+        windows[label, name] = begin, count or max(last - at, 1)
+        model.read_windows(run, [begin], windows[label, name][1])
     return prepared, windows
 
 
