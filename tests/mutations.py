@@ -55,6 +55,7 @@ CHANGES = {
     "campaign/pipeline.py": [
         ("turns += np.round(np.median(angles[known] / turn - turns))", "turns += 0", "campaign/test_steps.py::test_a_heading_has_no_jumps_of_a_whole_turn"),
         ("np.sign(steps), 0)", "-np.sign(steps), 0)", "campaign/test_steps.py::test_a_heading_has_no_jumps_of_a_whole_turn"),
+        ("for each in 2 * [*loggers.values()]", "for each in [*loggers.values()]", "campaign/test_steps.py::test_dates_and_seconds_of_day_are_in_step_over_midnight"),
         ('"sampling_rate", "group"}', '"sampling_rate"}', "formats/test_read_rosbag.py::test_topics_of_one_bag_are_loggers_as_the_page_says"),
         ('"accuracy"] = factor * each.accuracy', '"accuracy"] = each.accuracy', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
         ("groups[name] = group.sel(", "groups[name] = group; group.sel(", "campaign/test_plausibility.py::test_faults_outside_the_span_are_none_of_the_run"),
@@ -73,9 +74,10 @@ CHANGES = {
         ('if kind != "still")', 'if kind)', "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
     ],
     "campaign/readers.py": [
+        ("days if serial else days + UNIX", "days", "campaign/test_steps.py::test_dates_and_seconds_of_day_are_in_step_over_midnight"),
         ("past_midnight(table.values[name] * factor)", "past_midnight(table.values[name])", "formats/test_read_text.py::test_options"),
         ("day = day or float", "day = float", "campaign/test_steps.py::test_dates_and_seconds_of_day_are_in_step_over_midnight"),
-        ("values[name] % DATENUM", "values[name]", "campaign/test_steps.py::test_dates_and_seconds_of_day_are_in_step_over_midnight"),
+        ("days + UNIX) % DATENUM", "days + UNIX)", "campaign/test_steps.py::test_dates_and_seconds_of_day_are_in_step_over_midnight"),
     ],
     "campaign/prepare.py": [
         ("in span_mistakes(self.settings, surveyed.period):", "in ():", "campaign/test_periods.py::test_a_span_that_runs_backwards_in_any_run_stops_all"),

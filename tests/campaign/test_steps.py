@@ -259,12 +259,14 @@ def test_a_heading_has_no_jumps_of_a_whole_turn(tmp_path, mean):
 
 def test_dates_and_seconds_of_day_are_in_step_over_midnight(tmp_path):
     """Loggers of each way to write when, some of which start after midnight, and one of none."""
-    names = "shore", "mast", "excel", "matlab", "plc", "camera"
+    names = "unix", "shore", "mast", "excel", "matlab", "plc", "java", "camera"
     t = 86399.5 + np.arange(0, 60, 0.1)
     dates = pd.Timestamp("2024-05-03") + pd.to_timedelta(t, unit="s")
+    since = 86400 * 19846 + t  # days from 1970 to that one
     times = (
-        dates.strftime("%Y-%m-%d %H:%M:%S.%f"), dates[10:].strftime("%Y-%m-%dT%H:%M:%S.%fZ"),
-        45415 + t[10:] / 86400, 739375 + t / 86400, t % 86400, dates.strftime("%H:%M:%S.%f"),
+        since[10:], dates.strftime("%Y-%m-%d %H:%M:%S.%f"),
+        dates[10:].strftime("%Y-%m-%dT%H:%M:%S.%fZ"), 45415 + t[10:] / 86400, 739375 + t / 86400,
+        t % 86400, 1000 * since, dates.strftime("%H:%M:%S.%f"),
     )  # fmt: skip
     text = (
         "[channels]\n[instruments]\nreference = 'shore'\n"
@@ -274,16 +276,19 @@ def test_dates_and_seconds_of_day_are_in_step_over_midnight(tmp_path):
         write_csv(
             tmp_path / f"{name}.csv", {"time": time, f"z {name} [m]": t[-len(time) :] - 86400}
         )
-        days = "time_unit = 'd'\n" * (name in ("excel", "matlab"))
+        unit = {"excel": "d", "matlab": "d", "java": "ms"}.get(name)
         text += f"[channels.z_{name}]\ncolumn = 'z {name}'\n"
-        text += f"[instruments.{name}]\n{days}" * (name != "camera")
+        text += f"[instruments.{name}]\n" * (name != "camera")
+        text += f"time_unit = '{unit}'\n" if unit else ""
     files = "".join(f"{name} = '{name}.csv'\n" for name in names)
     path = tmp_path / "campaign.toml"
     path.write_text(f"{text}[preparation]\nsampling_rate = 10\n[runs.r]\n[runs.r.files]\n{files}")
-    run = read_campaign(path).prepare()["r"]
-    assert float(run["time"][0]) == pytest.approx(86400.5)
-    for name in names:  # a channel that is its own instant
-        assert_allclose(run[f"z_{name}"], run["time"] - 86400, rtol=0, atol=1e-3)
+    for reference in ("shore", "unix"):
+        edit(path, ("reference = 'shore'", f"reference = '{reference}'"))
+        run = read_campaign(path).prepare()["r"]
+        assert float(run["time"][0]) == pytest.approx(86400.5)
+        for name in names:  # a channel that is its own instant
+            assert_allclose(run[f"z_{name}"], run["time"] - 86400, rtol=0, atol=1e-3)
     edit(path, ("[instruments.camera]\n", "[instruments.camera]\ntime = 'time'\n"))
     with data_error("only where no row is lost, leave time out and state sampling_rate"):
         read_campaign(path).prepare()

@@ -220,8 +220,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path]) -> Ru
     order = [settings.instruments.reference, *settings.instruments.loggers, *loggers]
     reference = min(loggers, key=order.index)
     loggers = {reference: loggers.pop(reference), **loggers}
-    day = 0.0  # from whose midnight all dates of the run count
-    for each in loggers.values():
+    day = 0.0  # from whose midnight all dates of the run count; times since 1970 once it is known
+    for each in 2 * [*loggers.values()]:
         day = from_midnight(each.columns, each.options, day)
     return Run(name, settings, loggers, settings.campaign.encounter_period or np.nan)
 

@@ -25,6 +25,8 @@ COUNTED = 64
 """Times from which a column that counts 1, 2, 3 may count samples."""
 DATENUM = 693960
 """MATLAB's number of the day from which Excel counts."""
+UNIX = 25569
+"""Excel's number of 1 January 1970."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
 
 
@@ -149,13 +151,19 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
 
 
 def from_midnight(table: Columns, options: FileSettings, day: float = 0.0) -> float:
-    """Let serial days count from a day, or else the midnight before the first; return that day."""
+    """Let dates count from a day, or else the midnight before the first; return that day.
+
+    Dates are serial days, and where a day is given, so are times since 1970, as of Unix.
+    """
     name, values = time_column(table, options.time), table.values
     unit = time_unit_of(table, name or "", options.time_unit)
-    if name in values and same_unit(unit, "d") and values[name].size and values[name][0] > 1e4:
-        days = values[name] % DATENUM
-        day = day or float(days[0] // 1)
-        values[name] = np.round(DAY * (days - day), 6) / DAY
+    if name in values and values[name].size and is_unit(unit) and si_unit(unit) == "s":
+        a_day, serial = DAY / conversion(unit, "s"), same_unit(unit, "d")
+        days = values[name] / a_day
+        if days[0] > 1e4 and (serial or day):
+            days = (days if serial else days + UNIX) % DATENUM
+            day = day or float(days[0] // 1)
+            values[name] = np.round(DAY * (days - day), 6) / DAY * a_day
     return day
 
 
