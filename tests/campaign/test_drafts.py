@@ -5,6 +5,7 @@ from math import tau
 import numpy as np
 import pytest
 from numpy.random import default_rng
+from numpy.testing import assert_allclose
 from said import request_error
 from scipy import io
 from small_tank import tank_columns, write_csv
@@ -231,6 +232,23 @@ def test_files_of_several_loggers(tmp_path, drafted, pattern, runs):
     # Half of a sample: the pulses' edges lie between samples.
     found = campaign.prepare()["a1"].attrs["clock_mru_offset"]
     assert abs(found) == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_draft_of_measurements_at_sea(tmp_path, drafted):
+    """Of the logger of the wind none asks for the rate of the others."""
+    columns = {"radar": ("BOW_AIRGAP [m]", 5), "mru": ("MRU1.Heave (down) [m]", 10),
+               "met": ("Wind speed [kn]", 1)}  # fmt: skip
+    files = []
+    for logger, (column, rate) in columns.items():
+        t = np.arange(0, 100, 1 / rate)
+        files.append(write_csv(tmp_path / f"{logger}.csv", {"t [s]": t, column: np.cos(t)}))
+    text, campaign = drafted(files)
+    assert campaign.settings.preparation.sampling_rate == 5.0
+    signs = {name: each.sign for name, each in campaign.settings.channels.items()}
+    assert signs == {"bow_airgap": 1, "heave": -1, "wind_speed": 1}
+    assert text.count("# a range down to the waves? Then sign = -1") == 1
+    (run,) = campaign.prepare().values()
+    assert_allclose(run["heave"], -np.cos(run["time"]), atol=1e-3)  # resampled
 
 
 @pytest.mark.parametrize("pattern", ["{run}/{logger}.csv", "{run}_{logger}.csv"])

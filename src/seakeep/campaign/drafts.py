@@ -107,7 +107,11 @@ def draft_campaign(
     runs = list(dict.fromkeys(file.run for file in read))
     named = {run: kind for run in runs if (kind := waves_of_name(run))}
     kinds = {run: "regular" if sea.regular else "irregular" for run, sea in seas.items()} | named
-    rates = [file.rate for file in read if file.rate and math.isfinite(file.rate)]
+    known_rates = [(f.rate, f.logger) for f in read if f.rate and math.isfinite(f.rate)]
+    rates = [rate for rate, _ in known_rates]
+    moving = {g.logger for g in guesses if g.is_motion or g.is_range or is_elevation(g.channel)}
+    own = (rate for rate, logger in known_rates if logger in moving)
+    slowest = min(own, default=min(rates, default=25.0))
     shortest = min((sea.period for sea in seas.values()), default=0.0)
     return rendered(
         "campaign",
@@ -134,6 +138,7 @@ def draft_campaign(
         steps=STEPS,
         short_gap=SHORT_GAP,
         rates=rates,
+        slowest=slowest,
         shortest=shortest,
         # One step for all, no finer than that of the fastest logger.
         every=int(max(rates, default=0.0) * shortest / STEPS),

@@ -151,6 +151,17 @@ class Guess:
         """Whether it is a motion, a rate or an acceleration of the body."""
         return self.channel.partition("_")[0] in MOTIONS
 
+    @property
+    def is_range(self) -> bool:
+        """Whether it is a length that its name calls a range, such as to the waves."""
+        length = is_unit(self.unit) and si_unit(self.unit) == "m"
+        return length and "range" in kinds_of(self.column)
+
+    @property
+    def counts_down(self) -> bool:
+        """Whether it is a motion whose name says that it counts down."""
+        return self.is_motion and "down" in words_of(self.column)
+
 
 @dataclass(frozen=True)
 class Sea:
