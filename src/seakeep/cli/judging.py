@@ -140,7 +140,7 @@ def forecast(
     first = instant_of(start, read, prepared, "--start")
     if not isfinite(first):
         raise RequestError(f"--start: received {start[:20]!r}. Give an instant within the run, s.")
-    count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
+    count = None if steps is None else samples_of(steps, read, prepared, identified.dt, "--steps")
     left = round((float(prepared["time"][-1]) - first) / identified.dt)
     warn_of_waves(identified, prepared, run, first, left if count is None else count)
     if is_ensemble(identified):

@@ -243,7 +243,7 @@ def calibrate(
         used = [*fitted.states, *fitted.inputs]
         prepared = load_prepared(read, names=wanted, progress=progress, channels=used)
     parts = calibration_parts(read, prepared, fitted.dt, start, stop)
-    count = samples_of(steps, read, prepared.values(), fitted.dt, "--steps")
+    count = samples_of(steps, read, prepared[wanted[0]], fitted.dt, "--steps")
     with executor_of(workers, scheduler) as executor, progress_bar("Calibrating") as progress:
         calibrated = fitted.calibrate(
             parts,

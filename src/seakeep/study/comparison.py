@@ -9,7 +9,7 @@ Skill against lead time: a model in service, to which waves to come are not know
 
 import math
 import reprlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -297,7 +297,7 @@ def read_tests(
     for (label, model), (name, run) in product(models.items(), prepared.items()):
         check_channels(run, used, name)
         first = None if start is None else instant_of(start, campaign, run, "start")
-        count = None if steps is None else samples_of(steps, campaign, [run], model.dt, "steps")
+        count = None if steps is None else samples_of(steps, campaign, run, model.dt, "steps")
         span = whole_span(run, "test")
         at, last = samples_in(run, used, span, model.dt, history, lead, first)
         begin = float(run["time"][at]) if first is None else first
@@ -515,24 +515,22 @@ def instant_of(stated: float | str, campaign: Campaign, run: xr.Dataset, name: s
     try:
         return origin + float(stated)
     except (ValueError, OverflowError):
-        return origin + _seconds(str(stated), campaign, [run], name, "seconds such as 20")
+        return origin + _seconds(str(stated), campaign, run, name, "seconds such as 20")
 
 
 def samples_of(
-    stated: float | str, campaign: Campaign, runs: Iterable[xr.Dataset], dt: float, name: str
+    stated: float | str, campaign: Campaign, run: xr.Dataset, dt: float, name: str
 ) -> int:
     """Number of samples; a length in encounter periods is rounded to the nearest one."""
     try:
         count = int(stated) if isinstance(stated, str) else stated
     except ValueError:
-        return round(_seconds(str(stated), campaign, runs, name, "a whole number such as 400") / dt)
+        return round(_seconds(str(stated), campaign, run, name, "a whole number such as 400") / dt)
     return whole_number(count, name)
 
 
-def _seconds(
-    stated: str, campaign: Campaign, runs: Iterable[xr.Dataset], name: str, otherwise: str
-) -> float:
-    """A length in encounter periods, those that the runs were prepared with."""
+def _seconds(stated: str, campaign: Campaign, run: xr.Dataset, name: str, otherwise: str) -> float:
+    """A length in encounter periods, those that the run was prepared with."""
     try:
         length = parse_length(stated)
     except RequestError:
@@ -543,8 +541,7 @@ def _seconds(
             f"{name}: received {reprlib.repr(stated)}. Give {otherwise}, or encounter periods such "
             f"as '15 T'.{comma}"
         )
-    known = (float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs)
-    return length.value * (next(known, None) or campaign.encounter_period())
+    return length.value * (run.attrs.get("encounter_period") or campaign.encounter_period())
 
 
 ATTRIBUTES = {
@@ -758,7 +755,7 @@ def nowcasts(
     out: dict[str, list[xr.Dataset]] = {name: [] for name in models}
     for done, (name, key) in enumerate(product(every, prepared), 1):
         dt = every[name].signature.dt
-        count = samples_of(longest, campaign, prepared.values(), dt, "steps")
+        count = samples_of(longest, campaign, prepared[key], dt, "steps")
         out[name].append(nowcast(every[name], prepared[key], count, level=level))
         if progress is not None:
             progress(done, len(every) * len(prepared), f"{name}, {key}")
