@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pages import page
-from said import data_error, findings
+from said import data_error, findings, request_error
 from seas import sea
 from small_tank import tank_columns, write_csv
 from tutorial_study import edit
@@ -283,6 +283,9 @@ def test_dates_and_seconds_of_day_are_in_step_over_midnight(tmp_path):
     files = "".join(f"{name} = '{name}.csv'\n" for name in names)
     path = tmp_path / "campaign.toml"
     path.write_text(f"{text}[preparation]\nsampling_rate = 10\n[runs.r]\n[runs.r.files]\n{files}")
+    with request_error("shore.csv state a zone, and the others none.*offset = 0.0 in .*mast."):
+        read_campaign(path).prepare()
+    edit(path, ("[instruments.mast]\n", "[instruments.mast]\noffset = 0.0\n"))
     for reference in ("shore", "unix"):
         edit(path, ("reference = 'shore'", f"reference = '{reference}'"))
         run = read_campaign(path).prepare()["r"]

@@ -47,7 +47,7 @@ from seakeep.campaign.settings import (
 from seakeep.conventions import MOTIONS, conversion, same_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean, naming
 from seakeep.formats import Columns, read_columns
-from seakeep.formats.columns import is_unit, meant_column
+from seakeep.formats.columns import DAY_0, is_unit, meant_column
 from seakeep.quality import Finding, Rate, Record, Redundant, check
 from seakeep.quality.faults import (
     BRIDGED,
@@ -108,6 +108,12 @@ class Logger:
     def time(self) -> FloatArray:
         """Readings of its clock, s, checked for their order."""
         return times_of(self.path, self.columns, self.options)[1]
+
+    @property
+    def dates(self) -> str:
+        """Unit of its times if they were dates, which says whether they state a zone, else ""."""
+        unit = self.columns.units.get(time_column(self.columns, self.options.time) or "", "")
+        return unit if DAY_0 in unit else ""
 
     def column(self, wanted: str) -> FloatArray:
         """Values of a column, by name or full header, in the file's unit."""
@@ -252,6 +258,13 @@ def _clock(run: Run, logger: Logger, reference: Logger) -> Clock:
     pair = own.shared or own.correlated
     if not pair:
         stated = own.offset is not None or own.drift is not None
+        first = next((each for each in run.loggers.values() if each.dates), logger)
+        if not stated and logger.dates not in ("", first.dates):
+            raise RequestError(
+                f"its dates or those of {first.path} state a zone, and the others none, which "
+                "would be taken for UTC. Write the zone in both files or in none; or state by how "
+                f"many seconds this clock is ahead, offset = 0.0 in [instruments.{logger.name}]."
+            )
         return Clock(near, 1e-6 * (own.drift or 0.0), method="as stated" if stated else ASSUMED)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])

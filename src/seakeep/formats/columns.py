@@ -21,6 +21,8 @@ from seakeep.toml import Table, packaged
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
 _PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
 
+DAY_0 = "1899-12-30"
+"""Day from which Excel counts."""
 UNITS = packaged("formats/units.toml")
 """Units that names say: ends of names, and fields of messages."""
 

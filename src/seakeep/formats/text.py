@@ -17,7 +17,7 @@ import pandas as pd
 from seakeep.arrays import FloatArray
 from seakeep.conventions import same_unit
 from seakeep.errors import DataError, warn
-from seakeep.formats.columns import Columns, Options, is_unit, unique_names
+from seakeep.formats.columns import DAY_0, Columns, Options, is_unit, unique_names
 
 HEAD = 40
 """Lines that may stand above a header, and from which the layout is recognised."""
@@ -28,8 +28,8 @@ SHORT_END = 100
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z", re.ASCII)
 _INSTANT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:", re.ASCII)
 """How an instant of ISO 8601 starts."""
-DAY_0 = "1899-12-30"
-"""Day from which Excel counts."""
+_ZONE = re.compile(r"(Z|[+-]\d\d:?(\d\d)?)\Z", re.ASCII)
+"""How it ends if it states a zone."""
 _MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
 _OPENED = "[", "("
 _NO_THOUSANDS = re.compile(r"(?<!\d)0\d*,|(?<!\d),|\d{4},|,(?!\d{3}(?!\d))", re.ASCII)
@@ -360,8 +360,10 @@ def _columns(path: Path, frame: pd.DataFrame, layout: _Layout) -> Columns:
         if (unit := units[i]) is not None:
             out.units[name] = unit
         column = frame[i]
-        if _INSTANT.match(str(column.get(column.first_valid_index()))):
-            column, out.units[name] = _days(column), f"days since {DAY_0}"
+        first = str(column.get(column.first_valid_index())).strip()
+        if _INSTANT.match(first):
+            zone = " in UTC" if _ZONE.search(first) else ""
+            column, out.units[name] = _days(column), f"days since {DAY_0}{zone}"
         try:
             out.values[name] = _numbers(path, name, column, layout)
         except DataError as error:
