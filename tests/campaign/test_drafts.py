@@ -129,6 +129,22 @@ def test_a_draft_asks_whether_slow_files_count_milliseconds(drafted):
         assert ("time_unit = 'ms'" in text) is asks
 
 
+@pytest.mark.parametrize("odd", [0, 2])
+def test_one_file_in_milliseconds_is_drafted_as_such(tmp_path, drafted, odd):
+    """Sampled as slowly as its times say in s, all runs would look like repeats of one sea."""
+    files = []
+    for seed in range(3):
+        columns = tank_columns(seed, 60.0)
+        columns = {"t": columns.pop("Time [s]") * (1000 if seed == odd else 1)} | columns
+        files.append(write_csv(tmp_path / f"a{seed}.csv", columns))
+    text, campaign = drafted(files)
+    runs = campaign.settings.runs
+    assert [run.time_unit for run in runs.values()] == [None] * odd + ["ms"] + [None] * (2 - odd)
+    assert "sea_state = " not in text.replace("# sea_state", "")
+    times = [run["time"].values[[0, -1]] for run in campaign.prepare().values()]
+    assert_allclose(times, [times[0]] * 3)
+
+
 @pytest.mark.parametrize("loggers", [1, 2])
 def test_a_draft_tells_days_and_midnights(tmp_path, drafted, loggers):
     """The day begins before midnight; a logger beside counts seconds of day."""

@@ -39,6 +39,19 @@ def test_the_decay_of_an_oscillator_is_its_own(ratio):
     assert found.displacement[0, 0] == 1.0
 
 
+def test_swings_of_other_modes_are_no_decay():
+    """Heave is released into a mode that dies at once, and leaves 5 % to the oscillator."""
+    run = Oscillator(RATIO, DT).run(2000)
+    fast = run["heave"].copy(data=scipy.signal.lfilter([0, 1], [1, -0.3], run["eta_fwd"]))
+    run = run.assign(heave=fast + 0.1 * run["heave"], pitch=run["heave"] + 0.5 * fast)
+    fit = HankelDMDc(0, 0, 1e-9).fit(run, ["heave", "pitch", "heave_rate"], ["eta_fwd"])
+    found = check.decay(fit)
+    assert np.isnan([found.period[0], found.damping_ratio[0], found.p[0]]).all()
+    swings = free_decay(found.displacement[0].values, DT)
+    assert swings.damping_ratio == pytest.approx(RATIO, rel=0.01)
+    assert found.damping_ratio[1] == pytest.approx(RATIO, rel=0.01)
+
+
 def test_modes_say_which_states_take_part(model):
     found = check.modes(model)
     assert found.damping_ratio[0] == pytest.approx(RATIO, rel=1e-4)  # the ridge

@@ -112,6 +112,7 @@ def draft_campaign(
     moving = {g.logger for g in guesses if g.is_motion or g.is_range or is_elevation(g.channel)}
     own = (rate for rate, logger in known_rates if logger in moving)
     slowest = min(own, default=min(rates, default=25.0))
+    units = {file.time_unit for file in read}
     shortest = min((sea.period for sea in seas.values()), default=0.0)
     return rendered(
         "campaign",
@@ -138,6 +139,7 @@ def draft_campaign(
         steps=STEPS,
         short_gap=SHORT_GAP,
         rates=rates,
+        in_ms={f.run for f in read if f.time_unit == "ms"} if len(units) > 1 else (),
         slowest=slowest,
         shortest=shortest,
         # One step for all, no finer than that of the fastest logger.

@@ -294,10 +294,15 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
         File(path, table, time_column(table) or ("" if table.sampling_rate else _rising(table)))
         for path, table in zip(paths, tables, strict=True)
     ]
-    for table, time in ((file.table, file.time) for file in files):
+    steps = {file: time_step_of(file.table, file.time) or 1.0 for file in files}
+    for file, step in steps.items():
+        table, time = file.table, file.time
         said = time in table.units or named_unit(time)[1]
-        if not said and (time_step_of(table, time) or 1.0) < SERIAL:
+        usual = min(own for other, own in steps.items() if file.is_like(other))
+        if not said and step < SERIAL:
             table.units[time] = "d"
+        elif not said and 500 < step / usual < 2000:  # the others are in seconds
+            table.units[time] = "ms"
         from_midnight(table, FileSettings(time=time))
     for placed in placings(files):
         runs, loggers = {file.run for file in placed}, {file.logger for file in placed}

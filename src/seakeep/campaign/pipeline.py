@@ -214,6 +214,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path]) -> Ru
     loggers = {}
     for key, path in paths.items():
         options = settings.files
+        if unit := settings.runs[name].time_unit:
+            options = options.model_copy(update={"time_unit": unit})
         if key:
             own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate", "group"}
             options = options.model_copy(update=own.model_dump(include=keys, exclude_none=True))
@@ -553,8 +555,8 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
             raise DataError(
                 f"run '{run.name}' has {1 / own:.4g} samples per second by its times, and "
                 f"[preparation] asks for {1 / dt:.4g}. If its times are in ms, state time_unit = "
-                "'ms' in [files], or correct its header where that says s; else correct "
-                "sampling_rate, dt or steps_per_period."
+                f"'ms' in [files], or in [runs.{run.name}] if other runs are in s; where its "
+                "header says s, correct that; else correct sampling_rate, dt or steps_per_period."
             )
         origin = run.reference_time[0]
         first = np.ceil((begin - origin) / dt - 1e-6)

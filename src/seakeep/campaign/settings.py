@@ -386,6 +386,8 @@ class RunSettings(Table):
     """instrument = its file, relative to the campaign file"""
     sea_state: str = ""
     """a name for the sea state"""
+    time_unit: str | None = None
+    """unit of the time column of its files, such as 'ms', where it is not that of [files]"""
     waves: Literal["regular", "irregular", "still"] | None = None
     """'regular', 'irregular', or 'still' of a free decay"""
     role: Literal["train", "test", "unused"] | None = None

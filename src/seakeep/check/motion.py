@@ -35,6 +35,8 @@ from seakeep.models.linear import modes as modes_of
 
 LONGEST, SHORTEST = 20000, 200
 """Samples of a decay."""
+OWN = 0.25
+"""Part of what a cycle would leave of the offset, above which swings are the motion's own."""
 
 
 def _motions(model: Model) -> list[str]:
@@ -102,7 +104,8 @@ def decay(model: Model) -> xr.Dataset:
     Dataset
         Over (motion, time): ``displacement``, in parts of the offset; over motion: ``offset``,
         ``period`` (s), ``damping_ratio``, and ``p`` (decrement of a cycle); NaN of a motion with
-        fewer than three extremes.
+        fewer than three extremes, or with swings a quarter as large as that damping leaves of the
+        offset, which are those of other modes.
 
     Raises
     ------
@@ -131,7 +134,9 @@ def decay(model: Model) -> xr.Dataset:
         released = free_decay(left[np.isfinite(left)], single.dt)
         period = linear = np.nan
         if released:
-            period, linear = released["period"].item(), released["decrement"].values.mean()
+            decrement = released["decrement"].values.mean()
+            if released["amplitude"].values[0] > OWN * np.exp(-decrement):
+                period, linear = released["period"].item(), decrement
         damping = linear / np.hypot(2 * np.pi, linear)
         facts = {"offset": offset, "period": period, "damping_ratio": damping, "p": linear}
         rows.append(xr.Dataset({"displacement": ("time", left), **facts}))
