@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from ensembles import few
 from moored import moored_run
+from near import assert_near
 from said import request_error
 
 import seakeep
@@ -47,7 +48,7 @@ def test_a_measurement_is_drawn_at_its_own_instants_as_far_as_it_goes(run, model
         drawn, _ = seakeep.plot.overlay(forecast, measured).axes[0].get_lines()
         at = measured.sel(time=slice(10.1 - 1e-6, 15.0 + 1e-6))
         np.testing.assert_array_equal(drawn.get_data(), [at.time, at.surge])
-        assert drawn.get_xdata()[-1] == pytest.approx(last, abs=0.02)
+        assert_near(drawn.get_xdata()[-1], last, 0.02)
     with request_error(r"forecast is a DataArray; a run is an xarray\.Dataset"):
         seakeep.plot.overlay(forecast.heave, run)
 

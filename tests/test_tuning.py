@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from free_runs import held_out_scores
+from near import assert_near
 from said import request_error
 from squared import INPUTS, PERIOD, STATES, runs
 
@@ -53,7 +54,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
         # The house rule for results; but powers are bounded by the spread of all runs there, and
         # by that of those that train here.
         tolerance = 1e-3 if chosen else 1e-10
-        assert float(row["score"]) == pytest.approx(np.mean(found), abs=tolerance)
+        assert_near(row["score"], np.mean(found), tolerance)
 
 
 def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(

@@ -88,7 +88,7 @@ def test_means_follow_the_parameter():
         run["heave"].values[:] += 3.0 * run.attrs["rig"]["draught"]
     mean = spec.fit(runs, *OF_ARX).at(parameter=0.75).state_mean[0]
     # The mean of 4,000 samples of a heave of SD 2 to 6 is known to about a tenth.
-    assert mean == pytest.approx(2.25, abs=0.3)
+    assert_near(mean, 2.25, 0.3)
 
 
 def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
@@ -121,7 +121,7 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, family, monkeypat
     a = ON_STATE[0] + 3.3 * ON_STATE[1]
     radius = np.abs(np.roots([1.0, *-a])).max()
     # As the coefficients.
-    assert specs.largest_radius(wide) == pytest.approx(radius, abs=1e-7)
+    assert_near(specs.largest_radius(wide), radius, 1e-7)
     assert specs.largest_radius(model) < 1.0 < radius
     largest = specs.largest_radius
     monkeypatch.setattr(specs, "largest_radius", lambda m: 1.0 if m.variation else largest(m))

@@ -35,7 +35,7 @@ def test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forec
         spec = replace(SPEC, ridge=ridge, ridge_scale="per_snapshot")
         errors = [held_out_scores(spec, given, STATES, INPUTS, steps, 12) for steps in (150, 300)]
         # Sums in another order; horizons count alike.
-        assert scores[ridge] == pytest.approx(np.mean(errors, axis=0)[:3].mean(), abs=1e-10)
+        assert_near(scores[ridge], np.mean(errors, axis=0)[:3].mean(), 1e-10)
     # The largest that is as good as the best.
     near = [ridge for ridge, score in scores.items() if score <= 1.03 * min(scores.values())]
     assert [row["ridge"] for row in found.rows if row["chosen"]] == [max(near)]
@@ -59,7 +59,7 @@ def test_each_delay_is_scored_as_by_a_fit_and_forecasts_of_its_own():
         plain = replace(spec, ridge_scale="per_snapshot")
         scores = held_out_scores(plain, cut, STATES, INPUTS, 150, reach)
         # Moments of the cut runs, and of the whole ones.
-        assert score == pytest.approx(np.mean(scores), rel=1e-2)
+        assert_allclose(score, np.mean(scores), rtol=1e-2)
 
 
 def test_free_runs_side_by_side_score_as_one_after_the_other(monkeypatch):
@@ -92,9 +92,9 @@ def test_periods_are_counted_in_the_first_elevation():
     run["wind"].attrs["units"] = "m/s"
     still = run.assign(eta_fwd=0 * run["eta_fwd"])
     # Crossings of a sine between samples are linear to a thousandth of a step.
-    assert mean_period({"a": run}, [*periods]) == pytest.approx(2 / DT, rel=1e-3)
-    assert mean_period({"still": still, "a": run}, [*periods]) == pytest.approx(2 / DT, rel=1e-3)
-    assert mean_period({"a": run}, ["wind", "gauge"]) == pytest.approx(2.5 / DT, rel=1e-3)
+    assert_allclose(mean_period({"a": run}, [*periods]), 2 / DT, rtol=1e-3)
+    assert_allclose(mean_period({"still": still, "a": run}, [*periods]), 2 / DT, rtol=1e-3)
+    assert_allclose(mean_period({"a": run}, ["wind", "gauge"]), 2.5 / DT, rtol=1e-3)
     stated = run.assign_attrs(encounter_period=1.5)
     assert mean_period({"still": still, "b": stated}, [*periods]) == pytest.approx(15)
     with data_error(r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
@@ -110,9 +110,9 @@ def test_periods_are_those_of_the_elevation_farthest_up_wave(order):
     run["pressure"].attrs.update(units="Pa", x_position=-9.0)
     run["eta_fwd"].attrs["x_position"] = 1.0
     names = [*periods][order]
-    assert mean_period({"a": run}, names) == pytest.approx(2 / DT, rel=1e-3)
+    assert_allclose(mean_period({"a": run}, names), 2 / DT, rtol=1e-3)
     run["wave"].attrs["x_position"] = -1.0
-    assert mean_period({"a": run}, names) == pytest.approx(2.5 / DT, rel=1e-3)
+    assert_allclose(mean_period({"a": run}, names), 2.5 / DT, rtol=1e-3)
     assert {*elevations(run, names, "a")} == {"eta_fwd", "wave"}
 
 

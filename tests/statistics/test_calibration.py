@@ -72,7 +72,7 @@ def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
     found, *_ = learn_margin([Judged(values, y, np.ones((8, 50))) for y in errors], 0.95, "learnt")
     # The scale of the calm run is three times too small for the other: of |z| · 3 and
     # |z|/3 in equal parts, 95 % lie below 1.645 · 3. 800 errors tell it to 6 %.
-    assert found.margin[0] == pytest.approx(1.645 * 3, rel=0.15)
+    assert_allclose(found.margin[0], 1.645 * 3, rtol=0.15)
 
 
 def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
@@ -90,7 +90,7 @@ def test_floor_and_scores_by_hand_and_forecasts_that_are_lost():
         [[[0.0, 2.0], [np.nan, np.nan]], [[0.0, 1.0], [np.nan, np.nan]], [[3.0, -2.0], [0.0, 0.0]]]
     )[..., None]
     floor = spread_floor(mean, y)
-    assert floor[0] == pytest.approx(np.sqrt((9 + 16) / 2) / 4, rel=1e-15)
+    assert_allclose(floor[0], np.sqrt((9 + 16) / 2) / 4, rtol=1e-15)
     assert spread_floor(mean[1:], y[1:])[0] == 1.0
     scores = scaled_scores(mean, band_scale(std, floor), y)
     assert_allclose(scores[0, :, 0], [3 / floor[0], 4 / np.hypot(1, floor[0])])
@@ -113,4 +113,4 @@ def test_the_block_is_the_integrated_correlation_time():
     rng = default_rng(0)
     scores = np.stack([np.repeat(rng.standard_normal(500), 8) for _ in range(20)])[..., None]
     found = conformal_margin(scores, 0.9).block_length[0]
-    assert found == pytest.approx(8, rel=0.1)  # the first correlations beyond 8 are noise of 1 %
+    assert_allclose(found, 8, rtol=0.1)  # the first correlations beyond 8 are noise of 1 %
