@@ -27,13 +27,6 @@ def test_the_papers_bandwidth_lacks_the_divisor():
     assert_allclose(kernel_bandwidth(NORMAL), 1.06 * NORMAL.std(ddof=1) * 900**-0.2, rtol=1e-14)
 
 
-def test_on_an_uneven_grid_the_sum_is_taken_as_it_is():
-    grid = np.linspace(-4, 4, 512) + 1e-3 * np.sin(np.arange(512))
-    exact = norm.pdf(grid[:, None], PEAKY, kernel_bandwidth(PEAKY, "silverman")).mean(axis=1)
-    # 1e-12 is rounding of 900 terms.
-    assert_near(kernel_density(PEAKY, grid, "silverman"), exact, 1e-12)
-
-
 @pytest.mark.parametrize("h", [1e-6, 0.003, 3.0])
 @pytest.mark.parametrize("points", [2, 7, 512])
 def test_bins_keep_their_promise_on_any_even_grid(h, points):
@@ -45,8 +38,8 @@ def test_bins_keep_their_promise_on_any_even_grid(h, points):
     assert np.all(found >= 0)
 
 
-def test_a_constant_series_has_a_density_of_a_stated_bandwidth():
-    grid = np.r_[np.linspace(4.0, 5.0, 50), 5.5, 7.0]
+def test_a_constant_series_has_a_density_of_a_stated_bandwidth_also_on_an_uneven_grid():
+    grid = np.linspace(4.0, 7.0, 512) + 1e-4 * np.sin(np.arange(512))
     found = kernel_density(np.full(9, 5.0), grid, 0.4)
     assert_allclose(found, norm.pdf(grid, 5.0, 0.4), rtol=1e-12)  # rounding
 
