@@ -34,9 +34,9 @@ def pool():
 def test_results_come_in_order_and_progress_is_reported(pool):
     seen = []
     for executor in (None, pool, ThreadPoolExecutor(3)):
-        found = in_order(side_work.square, 3, range(70), executor, lambda *each: seen.append(each))
-        assert [value for _, value in found] == [3 * k**2 for k in range(70)]
-        assert seen[-1] == (70, 70, "member 70")
+        found = in_order(side_work.square, 3, range(40), executor, lambda *each: seen.append(each))
+        assert [value for _, value in found] == [3 * k**2 for k in range(40)]
+        assert seen[-1] == (40, 40, "member 40")
         assert list(in_order(side_work.square, 3, [], executor)) == []
 
 
