@@ -170,8 +170,7 @@ def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_p
     from seakeep.study import read_result
 
     fading = add("a model or a baseline", models.KINDS)["Fading"]
-    model = fading().fit(run, ["heave", "pitch"])
-    again = seakeep.load_model(model.save(tmp_path / "fading.nc"))
+    again = seakeep.load_model(fading().fit(run, ["heave", "pitch"]).save(tmp_path / "fading.nc"))
     forecast = again.forecast(run, start=10.0, steps=2)
     start, mean = run.heave.values[200], float(run.heave.mean())
     assert_allclose(forecast.heave.values[1], mean + 0.99**2 * (start - mean))

@@ -65,8 +65,7 @@ def test_mean_and_hold_last_are_what_they_say_and_read_no_input(runs):
 def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     test = linear_run(3)
     # Four states, and one for the constant by which the means of the samples are off.
-    change = {"ridge": 0.0, "order": 5} if kind == "subspace" else {}
-    spec = replace(SPECS[kind], **change)
+    spec = replace(SPECS[kind], **{"ridge": 0.0, "order": 5} if kind == "subspace" else {})
     forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
     assert_near(table(forecast, STATES), table(test, STATES)[201:501], 1e-7)
 

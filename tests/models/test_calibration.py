@@ -82,8 +82,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
     mean, std, *_ = table(plain, STATES)
     assert np.all(4 * found.floor > 1.5)  # the noise alone
     half = found.conformal.margin * np.sqrt(std**2 + found.floor**2)
-    expected = [mean, mean - half, mean + half]
-    assert_near(table(wide, STATES)[[0, 2, 3]], expected, 1e-12)
+    assert_near(table(wide, STATES)[[0, 2, 3]], [mean, mean - half, mean + half], 1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
 
 
@@ -94,9 +93,8 @@ def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble,
     margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
     sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
-    moved = table(wide, STATES) - table(plain, STATES)
     # One addition: rounding of numbers of about ten.
-    assert_near(moved, sides * margin, 1e-14 * 10)
+    assert_near(table(wide, STATES) - table(plain, STATES), sides * margin, 1e-14 * 10)
     assert wide.attrs["band"] == "calibrated"
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
 
@@ -201,7 +199,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
     found = pooled("all", {"a": run}).calibrate({"a": run}, 40, folds="run").calibration
     judged = []
     for begin, end in ((0, 300), (300, 600), (600, 900)):
-        rest = {"before": run.isel(time=slice(0, begin)), "after": run.isel(time=slice(end, None))}
+        rest = {"before": run.isel(time=slice(begin)), "after": run.isel(time=slice(end, None))}
         ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
         judged.append((ensemble, run.isel(time=slice(begin, end))))
     assert_learnt(found, *judged)

@@ -139,8 +139,7 @@ def test_far_outside_training_the_state_is_left(chosen, runs, drift):
         high[name].values[:] *= 20.0
     found, plain = (each.forecast(high, START, 60)["mooring_bow"] for each in (chosen, linear))
     floor = chosen.signature.readouts[0].floor
-    moved = np.abs(found - np.maximum(plain, floor)).max() / np.abs(plain - 30.0).max()
-    assert moved < 0.05
+    assert np.abs(found - np.maximum(plain, floor)).max() < 0.05 * np.abs(plain - 30.0).max()
 
 
 # A channel that rests on a floor in training, whether waves are carried or not.
@@ -163,7 +162,7 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
     assert not any(each.acts for each in moored(spec, slack=False).signature.readouts)
     ensemble = moored(few(readouts="auto"))
     monkeypatch.setattr(ensembles, "weigh_members", lambda _, parts, *__: parts[0].fill(-9.0))
-    found = ensemble.forecast(high[{"time": slice(0, 300)}], 20.0, 400, ahead="predict")
+    found = ensemble.forecast(high[{"time": slice(300)}], 20.0, 400, ahead="predict")
     assert np.all(found["mooring_stern"] == ensemble.signature.readouts[1].floor)
     unknown = moored(replace(spec, centre="run"))
     assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
@@ -182,7 +181,7 @@ def test_no_linear_system_stands_for_it(tmp_path):
 
 def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs):
     assert kinds(bow("auto").fit(runs["run1"], STATES, INPUTS)) == ["wave"]
-    model = bow("auto").fit(runs["run1"].isel(time=slice(0, 300)), STATES, INPUTS)
+    model = bow("auto").fit(runs["run1"].isel(time=slice(300)), STATES, INPUTS)
     assert kinds(model) == ["none"]
     assert "(not judged: no waves are carried, or" in model.summary()
 
