@@ -55,7 +55,7 @@ def test_intervals_of_the_extreme_cover_as_they_say():
 
 def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
     found = check.statistics(model, {"test": sea_run(seed=3, scale_factor=36.0)}).sel(state="heave")
-    assert found.attrs["duration"] == pytest.approx(3 * 3600 / 6)
+    assert_allclose(found.attrs["duration"], 3 * 3600 / 6)
     assert_allclose(found.significant_double_amplitude, 0.032, rtol=0.01)
     assert_allclose(found.zero_crossing_period, 2.0, rtol=0.05)
     assert_near(found.weibull_shape, 2.0, 0.5)
@@ -94,7 +94,7 @@ def test_statistics_at_full_scale_follow_froudes_law(model, train):
     own = model.settings.fit({"train": to_full_scale(train, 36.0)}, ["heave"], ["eta"])
     found = check.statistics(own, {"test": to_full_scale(run, 36.0)})
     expected = check.statistics(model, {"test": run})
-    assert found.attrs["duration"] == pytest.approx(3 * 3600)
+    assert_allclose(found.attrs["duration"], 3 * 3600)
     for key, factor in {"extreme": 36.0, "mean": 36.0, "zero_crossing_period": 6.0}.items():
         assert_allclose(found[key], factor * expected[key].values, rtol=1e-6)
 

@@ -192,7 +192,7 @@ def test_measurement_noise_makes_an_estimate_of_a_measured_state(model, drift):
 def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides():
     """Of two states that each follow x' = .98 x + b u + w, one is pushed by .7 SD of w for good."""
 
-    def sea(seed, push, samples=3000):
+    def sea(seed, push, samples=1500):
         rng = default_rng(seed)
         wave, noise = rng.standard_normal(samples), rng.standard_normal((samples, 2))
         forced = 0.5 * wave[:, None] + noise
@@ -220,7 +220,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     assert_near(one_step, [1.49, 1.0], 0.4)
     # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
     assert sway > 5 > 2.2 > heave > 0.2
-    assert drifting.consistency == pytest.approx(drifting.consistency_by_state.mean())
+    assert_allclose(drifting.consistency, drifting.consistency_by_state.mean())
     # The state that errs is named, its claims shrink by the errors of late, and the other's not.
     assert (sound.validity, drifting.validity) == (0, Validity.CONSISTENCY)
     assert [each.attrs["validity"] for each in (calm, pushed)] == ["inside", "consistency"]
@@ -230,9 +230,9 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     # A push of 2 SD adds 4 to the squares of one step. If it began 400 samples ago it shows (over
     # all samples, as 0.5); if it ended 330 ago, 256 and a free run of 64 or more, it is forgotten,
     # of which running means would keep e^(−330/256) = .28.
-    begun, _ = after(np.where(np.arange(3000) < 2600, 0.0, 2.0))
+    begun, _ = after(np.where(np.arange(1500) < 1100, 0.0, 2.0))
     assert_near(begun.consistency_by_state[0, 0], 1 + 4 * (1 - np.exp(-400 / 256)), 1)
-    ended, _ = after(np.where(np.arange(3000) < 2670, 2.0, 0.0))
+    ended, _ = after(np.where(np.arange(1500) < 1170, 2.0, 0.0))
     assert_near(ended.consistency_by_state[0, 0], 1.0, 0.3)
     assert ended.validity == Validity(0)
 
