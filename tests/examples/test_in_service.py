@@ -50,4 +50,4 @@ def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():
     for plans in (False, True):
         away[plans] = rms(PLAN.play(model, drifting(3), plans) - model.state_scale.centre[0])
     # A plan of another sign or another instant pushes it away.
-    assert away[True] < 0.7 * away[False]
+    assert away[True] < 0.4 * away[False]

@@ -238,7 +238,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
 
 
 def test_no_claim_exceeds_what_errors_of_late_and_departures_allow(model, drift, monkeypatch):
-    loud = drift.assign({name: 1.5 * drift[name] for name in STATES})
+    loud = drift.map(lambda x: 1.5 * x, keep_attrs=True)
     live, of_late = started(model, loud), np.ones((2, len(STATES)))
     monkeypatch.setattr(type(live), "consistency_by_state", of_late)
     calm = driven(live, loud)
@@ -254,9 +254,7 @@ def test_no_claim_exceeds_what_errors_of_late_and_departures_allow(model, drift,
 
 
 def test_outside_the_training_the_band_widens_and_says_why(model, drift, monkeypatch):
-    higher = drift.copy(deep=True)
-    for name in (*STATES, *INPUTS):
-        higher[name].values *= 1.7
+    higher = drift.map(lambda x: 1.7 * x, keep_attrs=True)
     stds = []
     for each in (drift, higher):
         live = started(model, each)
@@ -475,12 +473,11 @@ def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift, waves, moti
         assert np.abs(live._known_inputs()[-200:, dead]).max() < np.abs(waves[:, dead]).max()
 
 
-def test_skill_against_lead_time_is_that_of_forecasts_by_hand(model, live, drift, motions):
-    steps = 10
-    spread, truth = model.state_scale.spread, motions
-    truth[START + 5, 1] = np.nan  # not measured, and not judged
+def test_skill_against_lead_time_is_that_of_forecasts_by_hand(model, live, drift):
+    steps, known = 10, drift.copy(deep=True)
+    known["heave"].values[START + 5] = np.nan  # not measured, and not judged
+    spread, truth = model.state_scale.spread, table(known, STATES)
     span = tuple(float(drift.time[at]) for at in (START, START + 1 + steps))
-    known = drift.assign({n: ("time", truth[:, k], drift[n].attrs) for k, n in enumerate(STATES)})
     found = nowcast(model, known.assign_attrs(test_span=span), steps)
     assert found.attrs["starts"] == 2
     judged = []

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_runs
+from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, away, drifting_runs
 from drifting import STATES as MOTIONS
 from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
@@ -92,15 +92,12 @@ def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
 def test_a_line_is_sought_about_the_vessel_wherever_its_surge_counts_from(chosen, runs, drift):
     spec = replace(SPEC, readouts="auto", alignment=replace(FOLLOWED, offset=-20.0))
 
-    def away(run):
-        return run.assign(surge=(run["surge"] + 20.0).assign_attrs(units="m"))
-
-    model = spec.fit({name: away(run) for name, run in runs.items()}, STATES, INPUTS)
+    model = spec.fit({name: away(run, 20.0) for name, run in runs.items()}, STATES, INPUTS)
     (line,) = model.signature.readouts
     # Places that are tried are others, up to half of their step.
     step = 2 * model.signature.input_map.follows.place.spacing
     assert abs(line.load.place - 20.0 - LINE) <= step
-    assert error(model, away(drift)) < 1.2 * error(chosen, drift)
+    assert error(model, away(drift, 20.0)) < 1.2 * error(chosen, drift)
 
 
 def test_a_load_in_kilonewtons_is_read_off_as_one_in_newtons(chosen, runs, drift):
@@ -134,9 +131,7 @@ def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
 
 def test_far_outside_training_the_state_is_left(chosen, runs, drift):
     linear = SPEC.fit(runs, STATES, INPUTS)
-    high = drift.copy(deep=True)
-    for name in INPUTS:
-        high[name].values[:] *= 20.0
+    high = drift.assign(drift[INPUTS].map(lambda x: 20.0 * x, keep_attrs=True))
     found, plain = (each.forecast(high, START, 60)["mooring_bow"] for each in (chosen, linear))
     floor = chosen.signature.readouts[0].floor
     assert np.abs(found - np.maximum(plain, floor)).max() < 0.05 * np.abs(plain - 30.0).max()

@@ -85,10 +85,15 @@ def test_free_runs_side_by_side_score_as_one_after_the_other(monkeypatch):
     assert max(batches) == 4  # none, either, and both observables
 
 
+def sines(periods):
+    """A run of a minute whose channels have these periods, s."""
+    angles = 2 * np.pi * DT * np.arange(600)
+    return record(DT, **{name: np.sin(angles / period) for name, period in periods.items()})
+
+
 def test_periods_are_counted_in_the_first_elevation():
     periods = {"wind": 5, "eta_fwd_rate": 3, "gauge": 2.5, "eta_fwd": 2}
-    angles = 2 * np.pi * DT * np.arange(600)
-    run = record(DT, **{name: np.sin(angles / period) for name, period in periods.items()})
+    run = sines(periods)
     run["wind"].attrs["units"] = "m/s"
     still = run.assign(eta_fwd=0 * run["eta_fwd"])
     # Crossings of a sine between samples are linear to a thousandth of a step.
@@ -105,8 +110,7 @@ def test_periods_are_counted_in_the_first_elevation():
 def test_periods_are_those_of_the_elevation_farthest_up_wave(order):
     """A free name is an elevation where its channel states a position and metres."""
     periods = {"eta_fwd": 2, "wave": 2.5, "gauge": 3, "pressure": 4}
-    angles = 2 * np.pi * DT * np.arange(600)
-    run = record(DT, **{name: np.sin(angles / period) for name, period in periods.items()})
+    run = sines(periods)
     run["pressure"].attrs.update(units="Pa", x_position=-9.0)
     run["eta_fwd"].attrs["x_position"] = 1.0
     names = [*periods][order]
