@@ -19,10 +19,10 @@ from seakeep.models import KINDS, load_live
 from seakeep.study import compare, comparison_table, fit_campaign
 
 STEPS = 12
-MADE = [("own", ""), *((kind, each) for kind, spec in KINDS.items()
+MADE = [(kind, each) for kind, spec in KINDS.items()
         for each in ("paper", "recommended", "") if not each or hasattr(spec, each)
-        if each or not hasattr(spec, "recommended"))]  # fmt: skip
-"""Kinds by their presets, or without one where there is none; and the campaign's own table."""
+        if each or not hasattr(spec, "recommended")]  # fmt: skip
+"""Kinds by their presets, or without one where there is none."""
 FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
 """What two states and a short run allow."""
 PUT = {"tutorial": put_tutorial, "two loggers": two_loggers.write}
@@ -40,7 +40,7 @@ def campaign_of(tmp_path_factory):
         table = tomllib.loads((folder / "campaign.toml").read_text("utf-8"))
         channels = {key: table["model"][key] for key in ("states", "inputs")}
         models = table["models"] = {"own": table["model"]}
-        for kind, preset in MADE[1:]:
+        for kind, preset in MADE:
             models[f"{kind}{preset}"] = {"kind": kind} | channels
             if preset:
                 models[f"{kind}{preset}"]["preset"] = preset

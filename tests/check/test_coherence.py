@@ -94,9 +94,8 @@ def test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel():
     further = check.coherence(cubed.fit(light_run(5, noise=0), ["heave"], ["eta"]), test)
     beside = check.coherence(blurred, test, None, {"a": exact})
     for each in (check.coherence(exact, test), beside, further):
-        low, high = (float(each[f"linear_bound_{end}"][0]) for end in ("lower", "upper"))
         # The noise; the start of the free run, which has it too, adds some two per cent.
-        assert low / 1.02 < 0.01 / heave.std() < high
+        assert each.linear_bound_lower[0] / 1.02 < 0.01 / heave.std() < each.linear_bound_upper[0]
         assert each.linear_bound[0] <= each.nrmse[0]
 
 

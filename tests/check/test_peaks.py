@@ -59,11 +59,8 @@ def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
     assert_allclose(found.significant_double_amplitude, 0.032, rtol=0.01)
     assert_allclose(found.zero_crossing_period, 2.0, rtol=0.05)
     assert_near(found.weibull_shape, 2.0, 0.5)
-    low, high = (
-        float(found[f"extreme_{each}"].sel(kind="measured")) for each in ("lower", "upper")
-    )
-    assert low < 0.008 * np.sqrt(2 * np.log(900)) < high
     at = found.sel(kind="measured")
+    assert at.extreme_lower < 0.008 * np.sqrt(2 * np.log(900)) < at.extreme_upper
     above = np.exp(-((at.peak.max() / at.weibull_scale) ** at.weibull_shape))
     assert_allclose(at.extreme_chance, 1 - (1 - above) ** at.peaks, rtol=1e-6)
     step = float(found.deviation[1] - found.deviation[0])

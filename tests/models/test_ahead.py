@@ -94,7 +94,7 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     for made in (ensemble, ensemble.member(0)):
         windows = made.forecast_windows(short, [10.0, START], STEPS, ahead="predict")
         assert np.isnan(windows["input_predicted_from"][0])
-        assert float(windows["input_predicted_from"][1]) == since
+        assert windows["input_predicted_from"][1] == since
         alone = made.forecast_windows(short, [START], STEPS, ahead="predict")
         assert alone.attrs["input_predicted_from"] == since
         assert set(windows["status"].values[0].ravel()) == {"ok"}

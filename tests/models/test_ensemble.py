@@ -235,5 +235,5 @@ def test_draws_are_quantiles_of_any_distribution_of_scipy(run):
     draws = fitted(run, window=prior, ridge=stats.gamma(2.0)).draws
     for member in range(6):
         quantiles = child(np.random.SeedSequence(3), member).random(4)
-        assert float(draws.window[member]) == prior.ppf(quantiles[0])
-        assert float(draws.ridge[member]) == stats.gamma(2.0).ppf(quantiles[3])
+        assert draws.window[member] == prior.ppf(quantiles[0])
+        assert draws.ridge[member] == stats.gamma(2.0).ppf(quantiles[3])

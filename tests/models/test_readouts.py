@@ -42,6 +42,11 @@ def chosen(runs):
     return bow("auto").fit(runs, STATES, INPUTS)
 
 
+@pytest.fixture(scope="module")
+def linear(runs):
+    return SPEC.fit(runs, STATES, INPUTS)
+
+
 def moored(spec, **more):
     return spec.fit(moored_runs(**more), MOORED, ETA)
 
@@ -77,8 +82,7 @@ def test_the_wave_at_the_line_is_that_of_the_tank(chosen, drift):
     assert_near(rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), 0.05 * rate.std())
 
 
-def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
-    linear = SPEC.fit(runs, STATES, INPUTS)
+def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, linear, drift):
     assert chosen.signature.readouts[0].kind == "wave"
     assert error(chosen, drift) < 0.5 * error(linear, drift)
     assert_identical(
@@ -129,8 +133,7 @@ def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
     )
 
 
-def test_far_outside_training_the_state_is_left(chosen, runs, drift):
-    linear = SPEC.fit(runs, STATES, INPUTS)
+def test_far_outside_training_the_state_is_left(chosen, linear, drift):
     high = drift.assign(drift[INPUTS].map(lambda x: 20.0 * x, keep_attrs=True))
     found, plain = (each.forecast(high, START, 60)["mooring_bow"] for each in (chosen, linear))
     floor = chosen.signature.readouts[0].floor
