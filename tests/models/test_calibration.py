@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, table
 from said import request_error
 
-import seakeep
+from seakeep import Uniform, load_model
 from seakeep.core.bands import band_scores, conformal_margin
 from seakeep.models.calibration import held_out, learn_margin
 
 DT = 0.1
-NOISY = {"ridge": seakeep.Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
+NOISY = {"ridge": Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
 
 
 def sea(seed, samples=1600, name="sea"):
@@ -34,7 +34,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def ensemble(run):
-    spec = few(window=seakeep.Uniform("10 T", "16 T"), n_members=8, **NOISY)
+    spec = few(window=Uniform("10 T", "16 T"), n_members=8, **NOISY)
     return spec.fit(run, STATES, INPUTS, stop=60.0)
 
 
@@ -46,7 +46,7 @@ def bands(ensemble, run, tmp_path_factory):
     """Calibrated ensembles, from their files."""
     part, folder = run.sel(time=slice(None, 110.0)), tmp_path_factory.mktemp("bands")
     made = {scale: ensemble.calibrate(part, steps=40, scale=scale) for scale in SCALES}
-    return {scale: seakeep.load_model(each.save(folder / scale)) for scale, each in made.items()}
+    return {scale: load_model(each.save(folder / scale)) for scale, each in made.items()}
 
 
 def wide_of(ensemble, run):
@@ -208,7 +208,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
 
 
 def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
-    ensemble = pooled("windows", {"a": sea(0, 900, "a")}, seakeep.Uniform("4 T", "8 T"))
+    ensemble = pooled("windows", {"a": sea(0, 900, "a")}, Uniform("4 T", "8 T"))
     before = ensemble.arrays.offsets[0]  # samples that no member reads
     kept = ensemble.without_part(300 - before, 600 - before)
     spans = [(d.first(0, 900, ensemble.signature.input_map), d.last) for d in ensemble.members]

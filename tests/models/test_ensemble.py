@@ -3,7 +3,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from near import assert_near
 from numpy.random import default_rng
@@ -11,9 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, fed, record, table
 from said import data_error, warned
 from scipy import stats
+from xarray.testing import assert_equal, assert_identical
 
-import seakeep
-from seakeep import HankelDMDc, LogUniform, Uniform
+from seakeep import HankelDMDc, LogUniform, Uniform, summarize
 from seakeep.models import engine, forecasts
 from seakeep.models.ensemble import child
 
@@ -78,7 +77,7 @@ def test_draws_are_rounded_to_the_nearest_sample(run):
 def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
     six = fitted(run, sampling=sampling).draws
     kept = fitted(run, sampling=sampling, n_members=8).draws.isel(member=slice(6))
-    xr.testing.assert_equal(six, kept)
+    assert_equal(six, kept)
     assert not np.allclose(six.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
 
 
@@ -108,18 +107,18 @@ def test_priors_that_never_fit_are_refused(run):
 
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
     sequence = np.random.SeedSequence(3)
-    xr.testing.assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
+    assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
     assert sequence.n_children_spawned == 0
     spec = small(seed=default_rng(1), lead="0.2 T")
     first, second = (spec.fit(run, STATES, INPUTS, stop=60.0).draws for _ in range(2))
-    xr.testing.assert_identical(first, second)
+    assert_identical(first, second)
     assert child(sequence, 2).random() == default_rng(sequence.spawn(3)[2]).random()
 
 
 def test_the_summary_is_that_of_the_members(run, monkeypatch):
     ensemble = fitted(run, ridge=STABLE)
     members = ensemble.forecast(run, start=65.0, steps=77)
-    expected, values = seakeep.summarize(members, level=0.9), table(members, STATES)
+    expected, values = summarize(members, level=0.9), table(members, STATES)
     _, std, lower, _ = table(expected, STATES)
     assert_allclose(lower, np.quantile(values, 0.05, axis=0), rtol=1e-12)
     assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
@@ -143,9 +142,9 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     judged, _ = ensemble.judged_runs(run, "run", [650, 703], 60)
     assert_near(judged, table(together, STATES).mean(axis=1), 1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
-    expected = seakeep.summarize(together)
+    expected = summarize(together)
     assert_array_equal(table(summary, STATES), table(expected, STATES))
-    one = seakeep.summarize(together.assign_coords(window=[3, 4]).isel(window=1))
+    one = summarize(together.assign_coords(window=[3, 4]).isel(window=1))
     assert one.window == 4
     assert_array_equal(table(one, STATES), table(expected, STATES)[1])
 
