@@ -104,8 +104,7 @@ def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
         values = measure(**both(diverged))
         assert np.isfinite(values[0])
         assert np.isnan(values[1])
-    over_time = error_over_time(**both(diverged))
-    assert_array_equal(np.isnan(over_time), [False, False, True, True])
+    assert_array_equal(np.isnan(error_over_time(**both(diverged))), [False, False, True, True])
 
 
 # Datasets

@@ -52,8 +52,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
         found = held_out_scores(plain, given, STATES, INPUTS, 15 * PERIOD, first, groups)
         # The house rule for results; but powers are bounded by the spread of all runs there, and
         # by that of those that train here.
-        tolerance = 1e-3 if chosen else 1e-10
-        assert_near(row["score"], np.mean(found), tolerance)
+        assert_near(row["score"], np.mean(found), 1e-3 if chosen else 1e-10)
 
 
 def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(

@@ -108,8 +108,7 @@ def test_semisubmersible_heave_runs_freely_over_the_last_30_percent(semisubmersi
     campaign, model, _ = semisubmersible
     (judged,) = compare(model, campaign, ["Data01"])
     # The forecast ends where the waves do that the model looks ahead to, 10 s before the record.
-    share = model.training.stop[0] / float(judged.forecast["time"][-1] + 10.1)
-    assert_near(share, 0.7, 0.001)
+    assert_near(model.training.stop[0] / float(judged.forecast["time"][-1] + 10.1), 0.7, 0.001)
     assert judged.anrmse <= 0.28  # 0.253; coherence allows a linear model about 0.31
 
 

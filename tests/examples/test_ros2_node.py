@@ -169,8 +169,7 @@ def recorded(path, run, samples, lost=()):
             each[f"/wave_probe/{name}"] = stamped(**head, point=point(f"eta_{name}", at))
         for topic, made in each.items():
             if (topic, at) not in lost:
-                received = round(1e9 * seconds) + int(rng.integers(80_000_000))
-                sent.append((received, topic, made))
+                sent.append((round(1e9 * seconds) + int(rng.integers(80_000_000)), topic, made))
     return write_bag(path, sent)
 
 
@@ -188,8 +187,7 @@ def test_the_node_follows_a_recorded_bag(node, started, model, make_run, tmp_pat
         assert_near(node.seconds(each.header.stamp), CLOCK + at * DT, 1e-6)
         assert list(each.name) == model.states
         if at not in (60, 61):
-            measured = table(run, model.states)[at]
-            assert_near(each.position, measured, 1e-12)  # via a quaternion
+            assert_near(each.position, table(run, model.states)[at], 1e-12)  # via a quaternion
     assert vessel.warnings == [
         "lost in the last 10 s: eta_fwd missing: 1, heave missing: 2, pitch missing: 2"
     ]
@@ -229,8 +227,7 @@ def test_deviations_and_validity_are_those_of_the_live_model(started, model, run
     vessel.play(recorded(tmp_path / "bag", steep, range(240), unseen))
     vessel.forecast()
     live, found = vessel.follower.live, vessel.published
-    deviation = np.sqrt(np.diagonal(live.covariance))
-    assert_array_equal(found["~/estimate_std"][-1].position, deviation)
+    assert_array_equal(found["~/estimate_std"][-1].position, np.sqrt(np.diagonal(live.covariance)))
     expected = live.forecast(200)
     for topic, statistic in (("~/forecast", "mean"), ("~/forecast_std", "std")):
         assert_sent(found[topic][-1], expected, model, statistic)

@@ -160,8 +160,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
     found = ensemble.calibrate(runs, steps=40, folds="run").calibration
     # By hand: the same settings fitted anew on the other runs, which none of them has read.
     others = [{key: runs[key] for key in runs if key != name} for name in runs]
-    taught = [pooled("all", each) for each in others]
-    assert_learnt(found, *zip(taught, runs.values(), strict=True))
+    assert_learnt(found, *zip([pooled("all", each) for each in others], runs.values(), strict=True))
     assert found.folds == "run"
     assert found.windows == dict.fromkeys(runs, (500 - ensemble.history_samples) // 40)
     # A run that none has read is forecast by all.

@@ -101,8 +101,7 @@ inputs = ["eta"]
 alignment = { surge = "none" }
 lead = 0
 """
-    written = tuned_campaign(text, None, spec, ["kind"], "recommended", 16.0)
-    table = tomllib.loads(written)["model"]
+    table = tomllib.loads(tuned_campaign(text, None, spec, ["kind"], "recommended", 16.0))["model"]
     assert {"preset", "alignment"}.isdisjoint(table)
     again = resolve_model(ModelSettings(**table), 1.6, 0.1, aligned=True).spec
     assert replace(again, ridge=spec.ridge) == again == spec

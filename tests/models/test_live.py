@@ -60,8 +60,7 @@ def play(live, run, first, stop, lost=(), dead=()):
     u, y = table(run, INPUTS), table(run, STATES)
     for name in dead:
         y[:, STATES.index(name)] = np.nan
-    states = [live.step(u[at], None if at in lost else y[at]) for at in range(first, stop)]
-    return np.array(states)
+    return np.array([live.step(u[at], None if at in lost else y[at]) for at in range(first, stop)])
 
 
 def started(model, run, stop=START):

@@ -67,8 +67,7 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     assert_near(model.errors.rms, 0.0, 1e-6)
     served = [each.at(parameter=0.7).live(like=run).errors for each in (model, again)]
     assert_array_equal(served[0].rms, served[1].rms)
-    arrays = at.forecast_arrays(*arrays_at(at, run, 5.0), 200)
-    assert_near(arrays[:, 0], forecast.heave, 1e-9)
+    assert_near(at.forecast_arrays(*arrays_at(at, run, 5.0), 200)[:, 0], forecast.heave, 1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):
