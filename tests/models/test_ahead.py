@@ -126,7 +126,7 @@ def test_no_lead_errs_more_than_the_mean(drifts, drift, spec, positions):
     if model.signature.input_map.reference:  # to whose own means it returns
         run, zero = run.assign(heave=run.heave + 5.0), 5.0
     squares, mean = np.zeros((2, steps)), model.signature.state_scale.centre[1] + zero
-    for at in range(max(300, model.history_samples), 1300, 25):
+    for at in range(max(300, model.history_samples), 1300, 50):
         start, true = float(run.time[at]), run.heave.values[at + 1 : at + 1 + steps]
         found = model.forecast(up_to(run, at), start, steps, ahead="predict")
         squares += (found.heave.values - true) ** 2, (mean - true) ** 2
