@@ -188,7 +188,7 @@ CHANGES = {
         ("low + (place % 1.0) * (high - low)", "low", "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
         ("h = np.where(h > 0, h, of_constant)", "h = np.where(h > 0, h, 2 * of_constant)", "statistics/test_density.py::test_a_redraw_that_is_constant_has_the_bandwidth_of_its_series_beside_a_narrow_one"),
         ("np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
-        ("reach = h[:, None] * np.sqrt(2.0)", "reach = h[:, None]", "statistics/test_density.py::test_a_constant_series_has_a_density_of_a_stated_bandwidth"),
+        ("reach = h[:, None] * np.sqrt(2.0)", "reach = h[:, None]", "statistics/test_density.py::test_a_constant_series_has_a_density_of_a_stated_bandwidth_also_on_an_uneven_grid"),
         ("np.exp(-0.5 * (h[:, None] * angular) ** 2)", "np.exp(-((h[:, None] * angular) ** 2))", "statistics/test_density.py::test_bins_keep_their_promise_on_any_even_grid"),
     ],
     "core/embedding.py": [

@@ -1,8 +1,5 @@
-"""Every kind of model by every preset, and a model of every set of data: the same after a file."""
+"""Every kind of model by every preset, and one with an alignment: the same after a file."""
 
-import importlib.util
-import re
-import shutil
 import tomllib
 import zipfile
 from functools import cache
@@ -12,8 +9,7 @@ import pytest
 import tomlkit
 import two_loggers
 import xarray as xr
-from altered import altered
-from places import ROOT
+from tutorial_study import put_tutorial
 
 from seakeep import SeakeepError, load_model, read_campaign
 from seakeep.campaign import load_prepared, write_prepared
@@ -23,30 +19,14 @@ from seakeep.models import KINDS, load_live
 from seakeep.study import compare, comparison_table, fit_campaign
 
 STEPS = 12
-MADE = [("own", ""), *((kind, each) for kind, spec in KINDS.items()
+MADE = [(kind, each) for kind, spec in KINDS.items()
         for each in ("paper", "recommended", "") if not each or hasattr(spec, each)
-        if each or not hasattr(spec, "recommended"))]  # fmt: skip
-"""Kinds by their presets, or without one where there is none; and the campaign's own table."""
+        if each or not hasattr(spec, "recommended")]  # fmt: skip
+"""Kinds by their presets, or without one where there is none."""
 FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
 """What two states and a short run allow."""
-TANK = pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs the extra tank")
-
-
-def written(name, folder):
-    """Text of the campaign of a set of data, whose files are put into `folder`."""
-    if name == "tutorial":
-        shutil.copytree(ROOT / "docs/tutorial", folder, dirs_exist_ok=True)
-        return (folder / "campaign.toml").read_text("utf-8")
-    if name == "virtual tank":
-        from seakeep.tank.play import play
-        from seakeep.tank.settings import default_settings
-
-        settings = default_settings()
-        run = altered(settings.runs["irregular_1"], startup=5.0, duration=90.0)
-        play(altered(settings, runs={"irregular_1": run}), folder, kind="nc")
-        text = (folder / "campaign.toml").read_text("utf-8")
-        return re.sub("states = .*", 'states = ["surge", "heave", "pitch", "mooring_stern"]', text)
-    return two_loggers.write(folder).read_text("utf-8")
+PUT = {"tutorial": put_tutorial, "two loggers": two_loggers.write}
+"""Campaigns that are put into a folder; waves of the second are aligned."""
 
 
 @pytest.fixture(scope="module")
@@ -56,10 +36,11 @@ def campaign_of(tmp_path_factory):
     @cache
     def made(name):
         folder = tmp_path_factory.mktemp("data")
-        table = tomllib.loads(written(name, folder))
+        PUT[name](folder)
+        table = tomllib.loads((folder / "campaign.toml").read_text("utf-8"))
         channels = {key: table["model"][key] for key in ("states", "inputs")}
         models = table["models"] = {"own": table["model"]}
-        for kind, preset in MADE[1:]:
+        for kind, preset in MADE:
             models[f"{kind}{preset}"] = {"kind": kind} | channels
             if preset:
                 models[f"{kind}{preset}"]["preset"] = preset
@@ -128,7 +109,6 @@ def follow(model, run, path):
     [
         *(("tutorial", *each) for each in MADE),
         ("two loggers", "own", ""),
-        pytest.param("virtual tank", "own", "", marks=TANK),
     ],
 )
 def test_a_model_is_the_same_after_its_file(campaign_of, tmp_path, monkeypatch, name, kind, preset):

@@ -46,8 +46,7 @@ def test_help_version_and_wrong_requests_start_without_heavy_packages():
 
 def test_a_room_is_imported_when_it_is_used():
     assert imported_by("import seakeep; dir(seakeep)") == "[]"
-    code = "import seakeep; seakeep.study.run_study, seakeep.HankelDMDc"
-    assert "xarray" in imported_by(code)
+    assert "xarray" in imported_by("import seakeep; seakeep.study.run_study, seakeep.HankelDMDc")
 
 
 def test_the_public_names_are_there_and_no_others_are_shown():
@@ -63,7 +62,6 @@ def test_an_unknown_name_is_refused():
 
 
 def test_no_summary_in_the_help_is_cut_at_eighty_columns():
-    shown = printed("-m", "seakeep", "--help", COLUMNS="80")
-    listed = shown.partition("Commands:")[2].split("\n")
+    listed = printed("-m", "seakeep", "--help", COLUMNS="80").partition("Commands:")[2].split("\n")
     assert {line.split()[0] for line in listed if line.strip()} == set(VERBS)
     assert not [line for line in listed if "..." in line or "…" in line or len(line) > 80]

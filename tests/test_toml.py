@@ -62,8 +62,8 @@ def test_a_file_that_is_wrong_is_refused_in_words(tmp_path, content, message):
 
 @pytest.mark.parametrize(
     ("text", "value", "unit"),
-    [("1 T", 1, "T"), ("1.5T", 1.5, "T"), (" 2e1 T ", 20, "T"), ("inf T", float("inf"), "T"),
-     ("-.5 T", -0.5, "T"), ("4 /T", 4, "/T"), ("4 / T", 4, "/T"), ("1 T\u0302", 1, "T")],
+    [("1.5T", 1.5, "T"), (" 2e1 T ", 20, "T"), ("inf T", float("inf"), "T"),
+     ("-.5 T", -0.5, "T"), ("4 / T", 4, "/T"), ("1 T\u0302", 1, "T")],
 )  # fmt: skip
 def test_lengths_in_periods(text, value, unit):
     assert parse_length(text) == Length(value, unit)

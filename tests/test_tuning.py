@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from free_runs import held_out_scores
+from near import assert_near
 from said import request_error
 from squared import INPUTS, PERIOD, STATES, runs
 
-import seakeep
-from seakeep import HankelDMDc
+from seakeep import HankelDMDc, Powers, ProbeAlignment, SlowSquares, read_campaign, tune
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 
@@ -36,9 +36,9 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
         name: run.assign_attrs(sea_state=sea)
         for (name, sea), run in zip(seas.items(), (first, second, third), strict=True)
     }
-    powers = seakeep.Powers("eta", (2,))
+    powers = Powers("eta", (2,))
     spec = replace(SPEC, lead=4, observables=(powers,), centre=centre)
-    result = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds)
+    result = tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds)
     table = result.table
     assert words in result.describe()
     assert ("held out with each" in result.describe()) == (folds != "run")
@@ -52,8 +52,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
         found = held_out_scores(plain, given, STATES, INPUTS, 15 * PERIOD, first, groups)
         # The house rule for results; but powers are bounded by the spread of all runs there, and
         # by that of those that train here.
-        tolerance = 1e-3 if chosen else 1e-10
-        assert float(row["score"]) == pytest.approx(np.mean(found), abs=tolerance)
+        assert_near(row["score"], np.mean(found), 1e-3 if chosen else 1e-10)
 
 
 def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(
@@ -66,7 +65,7 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(
     assert "held out in turn" in told
     assert "read-out      mooring_bow: none, floor -0.0" in told
     assert campaign.read_text() == before
-    tuned = seakeep.read_campaign(written).model()
+    tuned = read_campaign(written).model()
     assert isinstance(tuned.ridge, float)
     assert tuned.ridge_scale == "per_snapshot"
     assert tuned.readouts == {}  # the tutorial's line is linear
@@ -136,8 +135,8 @@ celerity = 2.0
 
 [next]
 """
-    aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
-    slow = seakeep.SlowSquares("eta", lead=1.0)
+    aligned = ProbeAlignment(mode="dispersion", surge="predicted")
+    slow = SlowSquares("eta", lead=1.0)
     spec = replace(SPEC, ridge=0.1, memory=64, alignment=aligned, observables=[slow])
     varied = ["memory", "alignment", "observables"]
     read = tomllib.loads(tuned(before, spec, varied, 20.0))
@@ -184,12 +183,12 @@ powers = [2]
 mooring_bow = "wave"
 """
     )
-    spec = resolve_model(seakeep.read_campaign(path).model(), 1.5, 0.08).spec
+    spec = resolve_model(read_campaign(path).model(), 1.5, 0.08).spec
     assert spec.ridge == "rollout"
     assert spec.lead == 14
     squares, powers = spec.observables
-    assert squares == seakeep.SlowSquares("eta_mid", (0, 1, 2), 0.33, 2.0, (0.0, 1.0), 1.5)
-    assert powers == seakeep.Powers("eta_fwd", (2,))
+    assert squares == SlowSquares("eta_mid", (0, 1, 2), 0.33, 2.0, (0.0, 1.0), 1.5)
+    assert powers == Powers("eta_fwd", (2,))
     assert spec.readouts == (("mooring_bow", "wave"),)
     assert isinstance(spec, HankelDMDc)
 
@@ -215,7 +214,7 @@ def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_w
 
 
 def search(given, **more):
-    return seakeep.tune(SPEC, given, STATES, INPUTS, vary=["ridge"], horizon=(15,), **more)
+    return tune(SPEC, given, STATES, INPUTS, vary=["ridge"], horizon=(15,), **more)
 
 
 def test_a_search_that_was_interrupted_goes_on(tmp_path):
@@ -248,8 +247,6 @@ def test_a_search_reads_nothing_after_the_stop():
         for channel in (*STATES, *INPUTS):
             run[channel].values[601:] = np.nan
     options = {"vary": ["observables", "lead"], "horizon": (15,), "stop": 60.0}
-    one, other = (
-        seakeep.tune(SPEC, each, STATES, INPUTS, **options).table for each in (runs(2), poisoned)
-    )
+    one, other = (tune(SPEC, each, STATES, INPUTS, **options).table for each in (runs(2), poisoned))
     assert one.identical(other)
     assert np.isfinite(one["score"]).all()

@@ -7,8 +7,7 @@ from seakeep.core import embed, training_window
 
 
 def test_blocks_are_lag_major_the_newest_first():
-    series = np.array([[0.0, 10], [1, 11], [2, 12], [3, 13]])
-    columns = embed(series, delays=1, first=2, count=2)
+    columns = embed(np.array([[0.0, 10], [1, 11], [2, 12], [3, 13]]), delays=1, first=2, count=2)
     np.testing.assert_array_equal(columns.T, [[2, 12, 1, 11], [3, 13, 2, 12]])
 
 

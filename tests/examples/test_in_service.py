@@ -30,7 +30,7 @@ PLAN = loaded(EXAMPLES / "known_actuator/plan.py")
 
 def drifting(seed):
     """A surge of 40 s, driven by slow noise, and waves that do little to it."""
-    rng, dt, samples = np.random.default_rng(seed), 0.1, 4000
+    rng, dt, samples = np.random.default_rng(seed), 0.1, 2000
     a, b = PLAN.thruster(dt)
     slow = signal.lfilter([0.005], [1, -0.995], rng.standard_normal(samples))
     moved = np.zeros((samples, 2))
@@ -50,4 +50,4 @@ def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():
     for plans in (False, True):
         away[plans] = rms(PLAN.play(model, drifting(3), plans) - model.state_scale.centre[0])
     # A plan of another sign or another instant pushes it away.
-    assert away[True] < 0.7 * away[False]
+    assert away[True] < 0.4 * away[False]

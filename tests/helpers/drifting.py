@@ -53,6 +53,11 @@ def drifting_runs(count, *more):
     return {f"run{seed}": drifting_run(seed, *more) for seed in range(1, count + 1)}
 
 
+def away(run, by):
+    """The run, whose surge counts from another place."""
+    return run.assign(surge=(run["surge"] + by).assign_attrs(units="m"))
+
+
 def heave_error(model, run):
     """Error of the heave of a forecast of 300 steps, of the SD of what was measured."""
     forecast = model.forecast(run, start=60.0, steps=300)

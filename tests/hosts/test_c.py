@@ -61,8 +61,7 @@ def test_each_step_is_that_of_forecast_arrays(name, host, cases):
     case, run = cases[name], host(name)
     assert_array_equal(run.x, case.x_history[-1])
     for row, expected in zip(case.u[case.rows :], case.expected, strict=True):
-        status = run.step(run.memory, pointer(row))
-        assert status == (LOST if np.isnan(expected).any() else FINITE)
+        assert run.step(run.memory, pointer(row)) == (LOST if np.isnan(expected).any() else FINITE)
         # The same sums in another order, of numbers of the order of ten.
         assert_allclose(run.x, expected, rtol=1e-12, atol=1e-12)
 
@@ -110,8 +109,7 @@ def test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python(tmp_path, 
     assert int(np.argmax(np.isnan(expected[:, 0]))) == last
     run = Host(written({"rom": model}, tmp_path), "rom", 1)
     assert run.start(run.memory, pointer(start), pointer(u[:0])) == FINITE
-    statuses = [run.step(run.memory, pointer(row)) for row in u[: last + 1]]
-    assert statuses == [FINITE] * last + [LOST]
+    assert [run.step(run.memory, pointer(row)) for row in u[: last + 1]] == [FINITE] * last + [LOST]
 
 
 @pytest.mark.parametrize(

@@ -71,10 +71,6 @@ def run(slave, case, first, stop):
     return np.array(found)
 
 
-def test_fmpy_finds_no_fault(fmu):
-    assert validate_fmu(str(fmu)) == []
-
-
 OTHER_PROCESS = """
 import sys
 import numpy as np

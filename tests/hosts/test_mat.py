@@ -18,8 +18,7 @@ def filtered(content, name, values):
     a, b, c, d = (content[f"{name}{part}"] for part in "ABCD")
     if not a.shape[0]:  # of the newest sample alone
         return values @ d.T
-    system = (a.toarray(), b.toarray(), c, d, content["Ts"].item())
-    return signal.dlsim(system, values)[1]
+    return signal.dlsim((a.toarray(), b.toarray(), c, d, content["Ts"].item()), values)[1]
 
 
 def evaluated(text, p):

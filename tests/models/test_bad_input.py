@@ -118,13 +118,13 @@ def test_arrays_of_another_shape_are_refused_and_never_turned(model, name, shape
 def test_a_run_that_is_too_short_is_told_how_many_samples_are_missing(
     run, channels, settings, samples, missing
 ):
-    short = run.isel(time=slice(0, samples))
+    short = run.isel(time=slice(samples))
     with data_error(missing):
         HankelDMDc(3, 8, 1.0, **settings).fit(short, **channels)
 
 
 def test_the_shortest_run_that_is_long_enough_trains(run):
-    assert fit(run.isel(time=slice(0, 10))).training.columns == (1,)
+    assert fit(run.isel(time=slice(10))).training.columns == (1,)
 
 
 def test_runs_of_another_step_are_refused(model, run):
@@ -150,8 +150,7 @@ def test_a_constant_channel_cannot_be_standardised(run, channels, name, value):
 def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(make_run):
     slack = make_run(seed=1)
     slack.pitch[:] = 0.1
-    message = r"channel 'pitch' of run 2 is constant \(0\.1\) .* If its sensor was dead, leave"
-    with warned(message):
+    with warned(r"channel 'pitch' of run 2 is constant \(0\.1\) .* If its sensor was dead, leave"):
         model = fit([make_run(), slack])
     assert np.all(model.state_std > 0)
 
@@ -211,7 +210,7 @@ def test_what_a_forecast_refuses(model, run, start, steps, message):
 
 def test_a_run_shorter_than_the_history_has_no_later_start(model, run):
     with request_error(r"needs 9 .*The run ends at 0\.35 s: give a longer one"):
-        model.forecast(run.isel(time=slice(0, 8)), 0.25, 1)
+        model.forecast(run.isel(time=slice(8)), 0.25, 1)
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, table
 from said import request_error
 
-import seakeep
+from seakeep import Uniform, load_model
 from seakeep.core.bands import band_scores, conformal_margin
 from seakeep.models.calibration import held_out, learn_margin
 
 DT = 0.1
-NOISY = {"ridge": seakeep.Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
+NOISY = {"ridge": Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
 
 
 def sea(seed, samples=1600, name="sea"):
@@ -34,7 +34,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def ensemble(run):
-    spec = few(window=seakeep.Uniform("10 T", "16 T"), n_members=8, **NOISY)
+    spec = few(window=Uniform("10 T", "16 T"), n_members=8, **NOISY)
     return spec.fit(run, STATES, INPUTS, stop=60.0)
 
 
@@ -46,7 +46,7 @@ def bands(ensemble, run, tmp_path_factory):
     """Calibrated ensembles, from their files."""
     part, folder = run.sel(time=slice(None, 110.0)), tmp_path_factory.mktemp("bands")
     made = {scale: ensemble.calibrate(part, steps=40, scale=scale) for scale in SCALES}
-    return {scale: seakeep.load_model(each.save(folder / scale)) for scale, each in made.items()}
+    return {scale: load_model(each.save(folder / scale)) for scale, each in made.items()}
 
 
 def wide_of(ensemble, run):
@@ -71,7 +71,7 @@ def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale)
             found.append(((low <= measured) & (measured <= high)).mean())
     assert np.mean(inside["members"]) < 0.6
     # 880 instants, nearly independent noise: a standard error of 0.007, and 0.01 of the margin.
-    assert np.mean(inside["calibrated"]) == pytest.approx(0.95, abs=0.036)
+    assert_near(np.mean(inside["calibrated"]), 0.95, 0.036)
 
 
 def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run):
@@ -82,8 +82,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
     mean, std, *_ = table(plain, STATES)
     assert np.all(4 * found.floor > 1.5)  # the noise alone
     half = found.conformal.margin * np.sqrt(std**2 + found.floor**2)
-    expected = [mean, mean - half, mean + half]
-    assert_near(table(wide, STATES)[[0, 2, 3]], expected, 1e-12)
+    assert_near(table(wide, STATES)[[0, 2, 3]], [mean, mean - half, mean + half], 1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
 
 
@@ -94,9 +93,8 @@ def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble,
     margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
     sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
-    moved = table(wide, STATES) - table(plain, STATES)
     # One addition: rounding of numbers of about ten.
-    assert_near(moved, sides * margin, 1e-14 * 10)
+    assert_near(table(wide, STATES) - table(plain, STATES), sides * margin, 1e-14 * 10)
     assert wide.attrs["band"] == "calibrated"
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
 
@@ -106,8 +104,8 @@ def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
     (first, last) = ensemble.read_spans["sea"]
     # The longest draw with its delay history, up to stop.
     needed = max(draw.needed(ensemble.signature.input_map) for draw in ensemble.members)
-    assert last == pytest.approx(60.0)
-    assert last - first == pytest.approx((needed - 1) * DT)
+    assert_allclose(last, 60.0)
+    assert_allclose(last - first, (needed - 1) * DT)
     reach = ensemble.history_samples - 1
     before = int((round(first / DT) - 1 - reach) // 40)
     after = (1100 - 600) // 40
@@ -162,8 +160,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
     found = ensemble.calibrate(runs, steps=40, folds="run").calibration
     # By hand: the same settings fitted anew on the other runs, which none of them has read.
     others = [{key: runs[key] for key in runs if key != name} for name in runs]
-    taught = [pooled("all", each) for each in others]
-    assert_learnt(found, *zip(taught, runs.values(), strict=True))
+    assert_learnt(found, *zip([pooled("all", each) for each in others], runs.values(), strict=True))
     assert found.folds == "run"
     assert found.windows == dict.fromkeys(runs, (500 - ensemble.history_samples) // 40)
     # A run that none has read is forecast by all.
@@ -201,7 +198,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
     found = pooled("all", {"a": run}).calibrate({"a": run}, 40, folds="run").calibration
     judged = []
     for begin, end in ((0, 300), (300, 600), (600, 900)):
-        rest = {"before": run.isel(time=slice(0, begin)), "after": run.isel(time=slice(end, None))}
+        rest = {"before": run.isel(time=slice(begin)), "after": run.isel(time=slice(end, None))}
         ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
         judged.append((ensemble, run.isel(time=slice(begin, end))))
     assert_learnt(found, *judged)
@@ -210,7 +207,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
 
 
 def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
-    ensemble = pooled("windows", {"a": sea(0, 900, "a")}, seakeep.Uniform("4 T", "8 T"))
+    ensemble = pooled("windows", {"a": sea(0, 900, "a")}, Uniform("4 T", "8 T"))
     before = ensemble.arrays.offsets[0]  # samples that no member reads
     kept = ensemble.without_part(300 - before, 600 - before)
     spans = [(d.first(0, 900, ensemble.signature.input_map), d.last) for d in ensemble.members]

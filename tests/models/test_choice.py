@@ -135,19 +135,12 @@ def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch, count
     assert judged == [(len(one.starts(n, longer)), longer, 1) for n in range(count)]
 
 
-def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
-    start = replace(SPEC, select=None, lead=6)
-    found = select(start, runs(), STATES, INPUTS, vary=("lead", "observables"))
-    squared = {row["lead"] for row in found.rows if "slow_squares" in row["observables"]}
-    assert len(squared) > 1
-
-
 def test_a_look_ahead_that_is_left_open_may_be_varied_too():
     spec = replace(SPEC, alignment=None, select=None)
     found = select(spec, runs(), STATES, INPUTS, vary=("lead",), opened=("observables", "lead"))
     # The squares are those that go with each look-ahead: what was tried without one is not new.
     tried = [(row["lead"], row["observables"], row["ridge"]) for row in found.rows]
-    assert {lead for lead, *_ in tried} == {0, 5, 8, 10}
+    assert {lead for lead, names, _ in tried if "slow_squares" in names} == {0, 5, 8, 10}
     assert len(set(tried)) == len(tried)
 
 

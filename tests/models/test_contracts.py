@@ -12,8 +12,7 @@ from ensembles import few
 from records import record
 from said import data_error, request_error, warned
 
-import seakeep
-from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform
+from seakeep import BayesianHankelDMDc, HankelDMDc, Powers, ProbeAlignment, Uniform
 from seakeep.models import KINDS, InputMap, alignment, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.ensemble import Draw
@@ -31,7 +30,7 @@ def sea(seed=0):
 
 
 def test_each_probe_is_carried_once_per_run(drifts, drift):
-    measured = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
+    measured = ProbeAlignment(mode="dispersion", surge="measured")
     fitted = few(alignment=measured).fit(drifts, STATES, INPUTS)
     with patch.object(alignment, "carry_by_dispersion", wraps=carry_by_dispersion) as carries:
         fitted.forecast_windows(drift, [20.0, 25.0, 30.0], steps=20)
@@ -39,7 +38,7 @@ def test_each_probe_is_carried_once_per_run(drifts, drift):
 
 
 def test_a_forecast_upstream_says_how_far_ahead_it_reads(drifts, drift):
-    here = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=2.0)
+    here = ProbeAlignment(mode="effective", surge="none", celerity=2.0)
     for offset, ahead in ((0.0, 0.0), (-3.0, 1.5)):
         spec = HankelDMDc(2, 8, 1.0, alignment=replace(here, offset=offset))
         model = spec.fit(drifts, STATES, INPUTS)
@@ -150,7 +149,7 @@ def test_a_run_that_states_no_unit_is_taken_with_a_warning():
 def test_an_observable_that_overflows_is_refused():
     run = sea()
     run["eta"].values[7] = 1e60
-    spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
+    spec = HankelDMDc(1, 4, 1.0, observables=[Powers(("eta",), (3,))])
     with data_error(r"has a standard deviation that is not finite"):
         spec.fit(run, *HEAVE)
 

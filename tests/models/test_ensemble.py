@@ -3,7 +3,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-import xarray as xr
 from ensembles import INPUTS, STATES, few, wave_run
 from near import assert_near
 from numpy.random import default_rng
@@ -11,9 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import arrays_at, fed, record, table
 from said import data_error, warned
 from scipy import stats
+from xarray.testing import assert_equal, assert_identical
 
-import seakeep
-from seakeep import HankelDMDc, LogUniform, Uniform
+from seakeep import HankelDMDc, LogUniform, Uniform, summarize
 from seakeep.models import engine, forecasts
 from seakeep.models.ensemble import child
 
@@ -77,8 +76,7 @@ def test_draws_are_rounded_to_the_nearest_sample(run):
 @pytest.mark.parametrize("sampling", ["monte_carlo", "sobol"])
 def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
     six = fitted(run, sampling=sampling).draws
-    kept = fitted(run, sampling=sampling, n_members=8).draws.isel(member=slice(6))
-    xr.testing.assert_equal(six, kept)
+    assert_equal(six, fitted(run, sampling=sampling, n_members=8).draws.isel(member=slice(6)))
     assert not np.allclose(six.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
 
 
@@ -108,18 +106,18 @@ def test_priors_that_never_fit_are_refused(run):
 
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
     sequence = np.random.SeedSequence(3)
-    xr.testing.assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
+    assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
     assert sequence.n_children_spawned == 0
     spec = small(seed=default_rng(1), lead="0.2 T")
     first, second = (spec.fit(run, STATES, INPUTS, stop=60.0).draws for _ in range(2))
-    xr.testing.assert_identical(first, second)
+    assert_identical(first, second)
     assert child(sequence, 2).random() == default_rng(sequence.spawn(3)[2]).random()
 
 
 def test_the_summary_is_that_of_the_members(run, monkeypatch):
     ensemble = fitted(run, ridge=STABLE)
     members = ensemble.forecast(run, start=65.0, steps=77)
-    expected, values = seakeep.summarize(members, level=0.9), table(members, STATES)
+    expected, values = summarize(members, level=0.9), table(members, STATES)
     _, std, lower, _ = table(expected, STATES)
     assert_allclose(lower, np.quantile(values, 0.05, axis=0), rtol=1e-12)
     assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
@@ -143,9 +141,9 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     judged, _ = ensemble.judged_runs(run, "run", [650, 703], 60)
     assert_near(judged, table(together, STATES).mean(axis=1), 1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
-    expected = seakeep.summarize(together)
+    expected = summarize(together)
     assert_array_equal(table(summary, STATES), table(expected, STATES))
-    one = seakeep.summarize(together.assign_coords(window=[3, 4]).isel(window=1))
+    one = summarize(together.assign_coords(window=[3, 4]).isel(window=1))
     assert one.window == 4
     assert_array_equal(table(one, STATES), table(expected, STATES)[1])
 
@@ -165,8 +163,8 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     last = float(run.time[int(draws.last_sample[1])])
     expected = HankelDMDc(8, 16, 1.0, window=160).fit(run, STATES, INPUTS, stop=last)
     assert_near(ensemble.member(1).A, expected.A, 1e-10)
-    assert ensemble.member(1).training.stop == pytest.approx((last,))
-    shortest = run.isel(time=slice(0, 160 + 16))  # which leaves one place for the window
+    assert_allclose(ensemble.member(1).training.stop, (last,))
+    shortest = run.isel(time=slice(160 + 16))  # which leaves one place for the window
     found = small(train_on="windows", **fixed).fit(shortest, STATES, INPUTS)
     assert set(found.draws.last_sample.values) == {175}
 
@@ -186,7 +184,7 @@ def test_members_that_diverge_say_when():
     assert lost.any()
     gone = forecast.time.values[np.isnan(forecast.heave).values.argmax(axis=1)]
     said = [float(text.split()[4]) for text in forecast.status.values[lost]]
-    assert said == pytest.approx(gone[lost], abs=5e-3)  # as many digits as the step asks
+    assert_near(said, gone[lost], 5e-3)  # as many digits as the step asks
     assert_array_equal(summary.status, forecast.status)
     assert summary.attrs["diverged"] == forecast.attrs["diverged"] == lost.sum()
     assert forecast.attrs["status"] == f"{lost.sum()} of 10 members diverged"
@@ -235,5 +233,5 @@ def test_draws_are_quantiles_of_any_distribution_of_scipy(run):
     draws = fitted(run, window=prior, ridge=stats.gamma(2.0)).draws
     for member in range(6):
         quantiles = child(np.random.SeedSequence(3), member).random(4)
-        assert float(draws.window[member]) == prior.ppf(quantiles[0])
-        assert float(draws.ridge[member]) == stats.gamma(2.0).ppf(quantiles[3])
+        assert draws.window[member] == prior.ppf(quantiles[0])
+        assert draws.ridge[member] == stats.gamma(2.0).ppf(quantiles[3])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import FOLLOWED, INPUTS, OBSERVABLES, STATES, heave_error
+from drifting import FOLLOWED, INPUTS, OBSERVABLES, STATES, away, heave_error
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 from said import data_error, warned
@@ -127,9 +127,6 @@ def test_a_step_is_the_equation():
 
 
 def test_who_drifts_no_farther_than_in_training_is_to_read_further_ahead(drifts, drift):
-    def away(run, by):
-        return run.assign(surge=(run["surge"] + by).assign_attrs(units="m"))
-
     # Training goes to −1.9 m; without a look-ahead carriers know the waves to −1.5 m.
     spec = replace(SPEC, lead=0, observables=())
     model = spec.fit([away(run, -1.3) for run in drifts], STATES, INPUTS)

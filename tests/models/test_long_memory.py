@@ -25,8 +25,7 @@ def test_a_sparse_memory_is_recovered():
     # Exact data: what is left is rounding times the condition number, below 1e3.
     assert_near([*model.A[0], *model.B[0]], [*WEIGHTS, 0.7], 1e-10)
     run = remembering(7)
-    forecast = model.forecast(run, start=5.0, steps=200)
-    assert_near(forecast.heave, run.heave[51:251], 1e-9)
+    assert_near(model.forecast(run, start=5.0, steps=200).heave, run.heave[51:251], 1e-9)
 
 
 @pytest.mark.parametrize("more", [{"delay_rows": "ridge"}, {"stable": True}])

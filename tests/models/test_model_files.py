@@ -56,12 +56,9 @@ def test_another_format_is_refused_in_one_line(saved, number):
     )
 
 
-@pytest.mark.parametrize("part", ["coefficients", "learnt.rms", "settings", "signature"])
-def test_a_single_bit_that_changed_is_noticed(saved, part):
-    content, dataset = saved.read_bytes(), xr.load_dataset(saved, engine="h5netcdf")
-    held = dataset.attrs[part].encode() if part in dataset.attrs else dataset[part].values.tobytes()
-    begin = content.index(held)
-    for place in np.linspace(begin, begin + len(held) - 1, 5).astype(int):
+def test_a_single_bit_that_changed_is_noticed(saved):
+    content = saved.read_bytes()
+    for place in np.linspace(8, len(content) - 1, 20, dtype=int):  # after the mark of HDF5
         damaged = bytearray(content)
         damaged[place] ^= 1
         saved.write_bytes(damaged)

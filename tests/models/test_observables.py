@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 from drifting import DT, INPUTS
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
@@ -52,14 +52,14 @@ def test_settings_need_what_a_delayed_observable_reads(drift):
     needs = spec.needs(DT)
     assert (needs.history, needs.lead) == (14, 6)
     assert (model.history_samples - 1, model.lead_samples) == (14, 6)
-    assert model.signature.input_map.columns.observables[0].period == pytest.approx(1.5, rel=0.2)
+    assert_allclose(model.signature.input_map.columns.observables[0].period, 1.5, rtol=0.2)
 
 
 def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():
     kernel = slow_kernel(1 / (3 * PERIOD), 24)
     lag = np.arange(-24, 25)
     gains = [float(kernel @ np.cos(2 * np.pi * f * lag)) for f in (0, 1 / PERIOD, 2 / PERIOD)]
-    assert gains[0] == pytest.approx(1, abs=1e-12)  # rounding of a sum of 49 numbers
+    assert_near(gains[0], 1, 1e-12)  # rounding of a sum of 49 numbers
     assert abs(gains[1]) < 0.03  # the side lobes of the window
     assert abs(gains[2]) < 0.01
 
@@ -78,7 +78,7 @@ def test_slow_squares_are_the_sums_that_they_stand_for():
                 middle = row + shift
                 expected = sum(w * derivative(middle - 6 + i) ** 2 for i, w in enumerate(kernel))
                 # Rounding of thirteen squares of second differences.
-                assert found[order][row, column] == pytest.approx(expected, rel=1e-12)
+                assert_allclose(found[order][row, column], expected, rtol=1e-12)
 
 
 def test_columns_are_named_with_units_and_stand_in_two_groups(drift):

@@ -67,8 +67,7 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     assert_near(model.errors.rms, 0.0, 1e-6)
     served = [each.at(parameter=0.7).live(like=run).errors for each in (model, again)]
     assert_array_equal(served[0].rms, served[1].rms)
-    arrays = at.forecast_arrays(*arrays_at(at, run, 5.0), 200)
-    assert_near(arrays[:, 0], forecast.heave, 1e-9)
+    assert_near(at.forecast_arrays(*arrays_at(at, run, 5.0), 200)[:, 0], forecast.heave, 1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):
@@ -76,9 +75,8 @@ def test_windows_of_several_runs_take_the_value_of_each(model):
     places = [("deep", 5.0), ("shallow", 6.0), ("deep", 7.0)]
     together = model.free_runs(read_groups(model.signature, runs, [(places, 50)]))[0][0]
     for (name, start), values in zip(places, together, strict=True):
-        alone = model.forecast(runs[name], start, 50)
         # Windows side by side are summed in another order.
-        assert_near(values[:, 0], alone.heave, 1e-12)
+        assert_near(values[:, 0], model.forecast(runs[name], start, 50).heave, 1e-12)
 
 
 def test_means_follow_the_parameter():
@@ -86,9 +84,8 @@ def test_means_follow_the_parameter():
     runs = vessels((0.0, 0.5, 1.0), 20, 4000, 0.01)
     for run in runs:
         run["heave"].values[:] += 3.0 * run.attrs["rig"]["draught"]
-    mean = spec.fit(runs, *OF_ARX).at(parameter=0.75).state_mean[0]
     # The mean of 4,000 samples of a heave of SD 2 to 6 is known to about a tenth.
-    assert mean == pytest.approx(2.25, abs=0.3)
+    assert_near(spec.fit(runs, *OF_ARX).at(parameter=0.75).state_mean[0], 2.25, 0.3)
 
 
 def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
@@ -121,7 +118,7 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, family, monkeypat
     a = ON_STATE[0] + 3.3 * ON_STATE[1]
     radius = np.abs(np.roots([1.0, *-a])).max()
     # As the coefficients.
-    assert specs.largest_radius(wide) == pytest.approx(radius, abs=1e-7)
+    assert_near(specs.largest_radius(wide), radius, 1e-7)
     assert specs.largest_radius(model) < 1.0 < radius
     largest = specs.largest_radius
     monkeypatch.setattr(specs, "largest_radius", lambda m: 1.0 if m.variation else largest(m))

@@ -145,8 +145,7 @@ def test_training_reads_its_window_and_nothing_else(runs, run, model, expected):
     )
     # BLAS sums in an order that follows the memory.
     assert_near(found.coefficients, model.coefficients, 1e-11)
-    again = table(forecast_of(found, run), STATES)
-    assert_near(again, table(expected, STATES), 1e-9)
+    assert_near(table(forecast_of(found, run), STATES), table(expected, STATES), 1e-9)
 
 
 def test_files_and_tables_of_settings_hold_it_all(model, run, expected, tmp_path):

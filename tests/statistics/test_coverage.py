@@ -22,7 +22,7 @@ def test_each_channel_and_window_is_judged_alone():
     # Differences of sums of numbers of order one.
     assert_allclose(found.width, [[3.0, 1.0]] * 3, rtol=1e-12)
     expected = np.array([3.0, 1.0]) / measured.std(axis=1, ddof=1)
-    assert found.relative_width == pytest.approx(expected, rel=1e-12)
+    assert_allclose(found.relative_width, expected, rtol=1e-12)
 
 
 def test_a_band_with_gaps_and_a_constant_measurement_give_nan():
@@ -44,15 +44,14 @@ def test_the_crps_is_the_integral_that_defines_it(y):
     # ∫ (F(x) − 1{x ≥ y})² dx
     below = integrate.quad(lambda x: norm.cdf(x, centre, spread) ** 2, -40, y)[0]
     above = integrate.quad(lambda x: norm.sf(x, centre, spread) ** 2, y, 40)[0]
-    found = band_crps(centre - half, centre + half, y, level)
-    assert float(found) == pytest.approx(below + above, rel=1e-7)
+    assert_allclose(band_crps(centre - half, centre + half, y, level), below + above, rtol=1e-7)
 
 
 def test_the_score_of_the_true_band_is_that_of_the_normal_distribution():
     y = default_rng(2).standard_normal(200_000)
     half = norm.ppf(0.975)
     # (2/α)·2φ(z) of the true quantiles. 200 000 numbers: 0.5 %.
-    assert winkler_score(-half, half, y).mean() == pytest.approx(80 * norm.pdf(half), rel=0.01)
+    assert_allclose(winkler_score(-half, half, y).mean(), 80 * norm.pdf(half), rtol=0.01)
 
 
 def test_scores_of_bands_without_width_lost_or_infinite():
@@ -88,7 +87,7 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
         assert_allclose(found, (*(score.mean(axis=0) for score in scores), 3 / spread), rtol=1e-12)
     lower[0, 2, 1] = np.nan  # of one channel alone
     parted = coverage_table(lower[:3], upper[:3], y, 0.9)
-    for k, kept in ((0, slice(0, 3)), (1, slice(1, 3))):
+    for k, kept in ((0, slice(3)), (1, slice(1, 3))):
         alone = coverage_table(*(each[kept, :, [k]] for each in (lower, upper, y)), 0.9)
         for key in ("inside", "width", "winkler", "crps"):
             assert_allclose(getattr(parted, key)[:, k], getattr(alone, key)[:, 0])

@@ -45,7 +45,7 @@ def test_divergence_of_each_channel():
         )
         row = found.sel(channel=name)
         for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
-            assert float(row[key]) == getattr(alone, key)
+            assert row[key] == getattr(alone, key)
 
 
 def test_coverage_of_each_channel():
