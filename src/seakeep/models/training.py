@@ -183,7 +183,7 @@ def system_of(
     series = [(delayed, settings.input_delays), (with_means(settings, states, direct), 0)]
     if not settings.is_filter:
         series.insert(0, (states, settings.state_delays))
-    return primal_system(Delayed.of(states, series, windows))
+    return primal_system(Delayed(states, series, windows))
 
 
 def gather(
