@@ -706,16 +706,13 @@ class HankelSettings:
         delayed = self.input_delays
         if encounter_period and self.follows_surge:
             delayed += round(BACK * encounter_period / dt)
-        before, after = delayed, self.lead
-        for each in self.observables:
-            back, ahead = each.reach(dt)
-            before = max(before, back + (delayed if each.delayed else 0))
-            after = max(after, ahead + (self.lead if each.delayed else 0))
+        observed = Observed(self.observables, (), dt, ())
+        maps = InputMap(lead=self.lead, observed=observed, reference=self.centre)
         return Needs(
             self.window or 1,
-            max(self.state_reach, self.centre + before),
+            max(self.state_reach, maps.history(delayed)),
             self.history == "inside",
-            after,
+            maps.around.ahead,
         )
 
     def to_json(self) -> Json:

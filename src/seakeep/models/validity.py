@@ -245,8 +245,7 @@ class Coverage:
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
-        band = self.first + int(self.shares.argmax(axis=1).max(initial=0)) + 0.5
-        return int(0.25 / (dt * 2.0 ** (band / PER_OCTAVE)))
+        return int(0.25 * self.periods[self.shares.argmax(axis=1).max(initial=0)] / dt)
 
     def is_trained(self, frequency: FloatArray) -> BoolArray:
         """Whether frequencies (Hz) lie in bands that were trained, or beside one.
