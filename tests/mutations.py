@@ -397,7 +397,7 @@ CHANGES = {
         ("errors.of_forecast(windows.steps)", "0 * errors.of_forecast(windows.steps)", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
     ],
     "models/growth.py": [
-        ("return (n + p) / (n - p)", "return 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
+        ("factor = (n + p) / (n - p)", "factor = 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
         ("self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
         ("np.maximum.accumulate(reached)", "np.array(reached)[: len(parts[0].rms)]", "models/test_ahead.py::test_errors_of_several_models_are_known_as_far_as_those_of_any"),
     ],

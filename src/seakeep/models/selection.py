@@ -251,7 +251,11 @@ class Problem:
         """Models of some runs, one per level; coefficients of what a candidate lacks are zero."""
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
-        wide = self._widened(candidate)
+        # The longest delays, as far as the candidate's own columns are among those.
+        longest = {"input_delays": self.widest.input_delays - self.ahead(candidate)}
+        if not candidate.memory:  # whose blocks begin after the delays of the states
+            longest["state_delays"] = self.widest.state_delays
+        wide = candidate.having(**longest)
         signature, system = self._system(candidate, wide, runs)
         own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
         lags = np.tile(delayed, z + 1)
@@ -271,13 +275,6 @@ class Problem:
         coefficients[..., there] = path
         signature = replace(signature, state_delays=candidate.state_reach, input_delays=z)
         return [Dynamics(each, signature) for each in coefficients]
-
-    def _widened(self, candidate: HankelSettings) -> HankelSettings:
-        """A candidate with the longest delays, as far as its own columns are among those."""
-        longest = {"input_delays": self.widest.input_delays - self.ahead(candidate)}
-        if not candidate.memory:  # whose blocks begin after the delays of the states
-            longest["state_delays"] = self.widest.state_delays
-        return candidate.having(**longest)
 
     def _system(
         self, candidate: HankelSettings, wide: HankelSettings, runs: Sequence[int]
