@@ -52,7 +52,7 @@ def test_settings_need_what_a_delayed_observable_reads(drift):
     needs = spec.needs(DT)
     assert (needs.history, needs.lead) == (14, 6)
     assert (model.history_samples - 1, model.lead_samples) == (14, 6)
-    assert model.signature.input_map.columns.observables[0].period == pytest.approx(1.5, rel=0.2)
+    assert model.signature.input_map.observed.observables[0].period == pytest.approx(1.5, rel=0.2)
 
 
 def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():

@@ -572,7 +572,7 @@ class HankelDMDcModel(Model):
 
     def _system(self, *, is_file: bool = False) -> export.System:
         export.check_linear(self.signature)
-        if not all(each.terms for each in self.signature.input_map.columns.bound):
+        if not all(each.terms for each in self.signature.input_map.observed.bound):
             is_file = False  # only Python computes them
         if not is_file and (more := self.regressors[len(self.inputs) :]):
             raise RequestError(

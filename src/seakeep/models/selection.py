@@ -239,7 +239,7 @@ class Problem:
         """Which delayed and direct regressors a candidate has."""
         chain = self.data.signature.input_map
         delayed, direct = [True] * len(self.data.signature.inputs), list[bool]()
-        for observable, each in zip(self.widest.observables, chain.columns.bound, strict=True):
+        for observable, each in zip(self.widest.observables, chain.observed.bound, strict=True):
             columns = [observable in candidate.observables] * len(each.labels)
             (delayed if observable.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared

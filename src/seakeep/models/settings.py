@@ -32,7 +32,7 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean, quiet, warn
 from seakeep.models import labelled, store
 from seakeep.models.alignment import BACK, Following, ProbeAlignment
 from seakeep.models.inputs import InputMap
-from seakeep.models.observables import Observed, observables_of
+from seakeep.models.observables import NOTHING, Observed, observables_of
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.models.terms import Observable
 from seakeep.toml import Length, parse_length
@@ -673,7 +673,7 @@ class HankelSettings:
 
         Observables of a model that follows its own surge are made of waves without look-ahead.
         """
-        aligned = observed = None
+        aligned, observed = None, NOTHING
         if self.alignment is not None:
             aligned = self.alignment.fit(runs, states, inputs, window)
         if self.observables:

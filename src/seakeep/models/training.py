@@ -244,9 +244,8 @@ def gather(
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
     data = _standardised(pieces, dt, labels, input_map, settings)
     if len(pieces) > 1:
-        own = data.signature
-        _warn_of_dead(pieces, 0, own.state_scale, own.states)
-        _warn_of_dead(pieces, 1, own.input_scale, own.regressors)
+        _warn_of_dead(pieces, 0, data.signature.state_scale, labels[0])
+        _warn_of_dead(pieces, 1, data.signature.input_scale, input_map.regressors(labels[1])[0])
     return replace(data, inputs=tuple(read))
 
 
@@ -432,7 +431,8 @@ def run_regressors(
     span = span._replace(first=span.first + missing)
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
-    as_is = input_map.alignment is None and input_map.observed is None and not input_map.lead
+    observed = bool(input_map.observed.observables)
+    as_is = input_map.alignment is None and not observed and not input_map.lead
     first = needed if as_is and needed is not None else read.first
     labelled.check_finite(values[first : read.stop], inputs, run, name, first)
     surge = None
@@ -527,7 +527,9 @@ def _stops_by_run(stop: Any, names: list[str]) -> dict[str, Any]:
     return dict.fromkeys(names, stop)
 
 
-def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequence[str]) -> None:
+def _warn_of_dead(
+    pieces: Sequence[Piece], group: int, scale: Scale, labels: Sequence[ChannelLabel]
+) -> None:
     """Warn of channels that move in some runs and stand still in others."""
     for piece in pieces:
         seen = piece.series[group][piece.window.samples]
@@ -535,9 +537,9 @@ def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequ
         still = np.ptp(seen, axis=0) <= 1e-12 * np.abs(seen).max(axis=0, initial=0.0)
         for column in np.flatnonzero(still & (scale.spread > 0)).tolist():
             warn(
-                f"channel '{names[column]}' of {piece.name} is constant ({seen[0, column]:.6g}) "
-                "over its training window, and moves in other runs. If its sensor was dead, leave "
-                "this run out: the model would learn that nothing moves."
+                f"channel '{labels[column].name}' of {piece.name} is constant "
+                f"({seen[0, column]:.6g}) over its training window, and moves in other runs. If "
+                "its sensor was dead, leave this run out: the model would learn that nothing moves."
             )
 
 
