@@ -30,7 +30,7 @@ from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series
 from seakeep.models.forecasts import reduce_members
 from seakeep.models.inputs import Signature
-from seakeep.models.training import TrainingArrays
+from seakeep.models.training import RunArrays
 from seakeep.signals import repeated_waves
 
 Band = Literal["members", "calibrated"]
@@ -65,7 +65,7 @@ class Ensemble(FreeRuns, Protocol):
     """Members of an ensemble that a calibration uses."""
 
     @property
-    def arrays(self) -> TrainingArrays:
+    def arrays(self) -> tuple[RunArrays, ...]:
         """What the members were trained on."""
 
     @property
@@ -169,7 +169,7 @@ def calibrate(
         known = _read_run(ensemble, name, run) if folds else None
         if known is None:
             cases[name] = ensemble, run
-        elif len(ensemble.arrays.names) > 1:
+        elif len(ensemble.arrays) > 1:
             cases[name] = _without_waves_of(ensemble, known), run
         else:
             cases |= _parts(ensemble, name, run)
@@ -280,10 +280,10 @@ def held_out(
 
 def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
     """Members as they learn from runs of other waves; from all other runs where none has others."""
-    arrays, signature, alike = ensemble.arrays, ensemble.signature, [run]
+    signature, alike = ensemble.signature, [run]
     if waves := [*filter(is_elevation, signature.inputs)]:
         at = signature.inputs.index(waves[0])
-        records = {n: x[:, at] for n, x in zip(arrays.names, arrays.delayed, strict=True)}
+        records = {each.name: each.delayed[:, at] for each in ensemble.arrays}
         groups = repeated_waves(records, signature.dt)
         alike = [name for name in records if groups[name] == groups[run]]
     with suppress(RequestError):  # no member has others
@@ -296,9 +296,9 @@ def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
 
 def _parts(ensemble: Ensemble, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:
     """Thirds of the run that trains alone, and the ensemble as it learns from the rest of it."""
-    begin, half = ensemble.arrays.begins[0], 0.5 * ensemble.signature.dt
-    edges = np.linspace(0, len(ensemble.arrays.states[0]), PARTS + 1).round().astype(int)
-    times = begin + edges * ensemble.signature.dt - half
+    (whole,), half = ensemble.arrays, 0.5 * ensemble.signature.dt
+    edges = np.linspace(0, len(whole.states), PARTS + 1).round().astype(int)
+    times = whole.begin + edges * ensemble.signature.dt - half
     times[[0, -1]] = -np.inf, np.inf  # what no member reads goes with its neighbour
     for number in range(PARTS):
         part = run.sel(time=slice(times[number], times[number + 1]))
@@ -348,16 +348,16 @@ def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
 
     A name that was made up for a run without one says nothing.
     """
-    arrays, spans, signature = ensemble.arrays, ensemble.read_spans, ensemble.signature
+    spans, signature = ensemble.read_spans, ensemble.signature
     time = np.asarray(run["time"].values, dtype=float)
     values = labelled.channel_matrix(run, signature.states, name)
-    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
-        if key in spans and time.size:
-            ahead = round((begin - time[0]) / signature.dt)  # samples before the states
-            here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
+    for each in ensemble.arrays:
+        if each.name in spans and time.size:
+            ahead = round((each.begin - time[0]) / signature.dt)  # samples before the states
+            here, there = values[max(ahead, 0) :], each.states[max(-ahead, 0) :]
             count = min(len(here), len(there))  # as far as both reach
             if count > 0 and np.array_equal(here[:count], there[:count]):
-                return key
+                return each.name
     return name if name in spans and not labelled.is_made_up(name, run) else None
 
 

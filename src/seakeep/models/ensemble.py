@@ -60,7 +60,7 @@ from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.settings import HankelSettings, unit_of
-from seakeep.models.training import TrainingArrays, TrainingData, departing
+from seakeep.models.training import RunArrays, TrainingData, departing, member_data
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
@@ -164,8 +164,8 @@ class HankelEnsemble(Model):
         Priors, seed and rules that made the draws, as JSON values.
     members : tuple of Draw
         Settings of each member, and what trains it.
-    arrays : TrainingArrays
-        Training data of the members.
+    arrays : tuple of RunArrays
+        Training data of the members, by run.
     signature : Signature
         Time step, names and units, longest delays, and how inputs drive the members.
     coverage : Coverage
@@ -185,7 +185,7 @@ class HankelEnsemble(Model):
     settings: HankelSettings
     origin: Json
     members: tuple[Draw, ...]
-    arrays: TrainingArrays
+    arrays: tuple[RunArrays, ...]
     signature: Signature
     coverage: Coverage
     calibration: Calibration | None = None
@@ -228,26 +228,26 @@ class HankelEnsemble(Model):
     @cached_property
     def training_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant of the training windows in each run that trains a member, s."""
-        spans, arrays = dict[str, tuple[float, float]](), self.arrays
-        for run, (name, begin) in enumerate(zip(arrays.names, arrays.begins, strict=True)):
+        spans = dict[str, tuple[float, float]]()
+        for run, arrays in enumerate(self.arrays):
             firsts, ends = [], []
             for draw in self._taught:
                 if draw.run in (None, run):
-                    whole, window = len(arrays.states[run]), draw.settings.window
-                    ends.append(whole - 1 if draw.last is None else draw.last - arrays.offsets[run])
+                    whole, window = len(arrays.states), draw.settings.window
+                    ends.append(whole - 1 if draw.last is None else draw.last - arrays.offset)
                     firsts.append(0 if window is None else ends[-1] - window + 1)
             if ends:
-                spans[name] = begin + min(firsts) * self.dt, begin + max(ends) * self.dt
+                begin = arrays.begin
+                spans[arrays.name] = begin + min(firsts) * self.dt, begin + max(ends) * self.dt
         return spans
 
     @cached_property
     def read_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant that any member reads of each run, delay history included, s."""
-        arrays = self.arrays
         return {
-            name: (begin, begin + (len(x) - 1) * self.dt)
-            for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
-            if len(x)
+            each.name: (each.begin, each.begin + (len(each.states) - 1) * self.dt)
+            for each in self.arrays
+            if len(each.states)
         }
 
     def free_runs(
@@ -304,7 +304,8 @@ class HankelEnsemble(Model):
     def _identified(self, number: int) -> tuple[TrainingData, Solution]:
         """Training data and regression of a member."""
         draw = self._taught[number]
-        data = self.arrays.data(draw.settings, draw.run, draw.last, self.signature)
+        arrays = self.arrays if draw.run is None else [self.arrays[draw.run]]
+        data = member_data(arrays, draw.settings, draw.last, self.signature)
         return data, data.regress(draw.settings)
 
     def spectral_radii(
@@ -375,8 +376,8 @@ class HankelEnsemble(Model):
             f"  history       {self.history_samples} samples up to the start of a forecast",
             *self.signature.input_map.describe(self.dt),
             *(each.describe() for each in self.signature.readouts),
-            f"  training      {counted(len(self.arrays.names), 'run')}"
-            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays.names) > 1 else ""),
+            f"  training      {counted(len(self.arrays), 'run')}"
+            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays) > 1 else ""),
         ]
         lines += [
             f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
@@ -710,8 +711,8 @@ class HankelEnsemble(Model):
     @cached_property
     def errors(self) -> LeadErrors | None:
         """Errors of the members' mean on what they learnt from; None where that is too short."""
-        signature, arrays = self.signature, self.arrays
-        series: Any = zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
+        signature = self.signature
+        series: Any = ((each.states, each.delayed, each.direct) for each in self.arrays)
         first = signature.history_samples - 1
         if signature.input_map.reference:  # departures need no period before a start
             series = departing(series, signature.input_map)
@@ -809,7 +810,7 @@ class HankelEnsemble(Model):
         RequestError
             If no member is left, or no run of that name trains.
         """
-        names = self.arrays.names
+        names = [each.name for each in self.arrays]
         if run not in names:
             raise RequestError(f"no run '{run}' trains. Those that do: {', '.join(names)}.")
         left_out = names.index(run)
@@ -823,7 +824,7 @@ class HankelEnsemble(Model):
                 f"no member learnt from another run than '{run}', and none is left to forecast "
                 "it. Train on several runs, or calibrate on a run that does not train."
             )
-        arrays = self.arrays.without(left_out, 0, len(self.arrays.states[left_out]), self.dt)
+        arrays = self.arrays[:left_out] + self.arrays[left_out + 1 :]
         return replace(self, members=members, arrays=arrays, calibration=None, identified=())
 
     def without_part(self, begin: int, end: int) -> HankelEnsemble:
@@ -844,20 +845,16 @@ class HankelEnsemble(Model):
         RequestError
             If no member is left.
         """
-        arrays = self.arrays.without(0, begin, end, self.dt)
-        whole = self.arrays.offsets[0] + len(self.arrays.states[0])
-        pieces = [
-            (number, offset, offset + len(x))
-            for number, (offset, x) in enumerate(zip(arrays.offsets, arrays.states, strict=True))
-        ]
+        (every,) = self.arrays
+        whole, arrays = every.offset + len(every.states), every.without(begin, end, self.dt)
         members = [replace(draw, run=None) for draw in self.members if draw.settings.window is None]
         for draw in (each for each in self.members if each.settings.window is not None):
             first = draw.first(0, whole, self.signature.input_map)
             last = whole - 1 if draw.last is None else draw.last
             members += [
                 replace(draw, run=number, last=last)
-                for number, start, stop in pieces
-                if start <= first and last < stop
+                for number, each in enumerate(arrays)
+                if each.offset <= first and last < each.offset + len(each.states)
             ]
         if not members:
             raise RequestError(
@@ -865,7 +862,13 @@ class HankelEnsemble(Model):
                 "to forecast it. Train with shorter windows or on several runs, or calibrate on "
                 "a run that does not train."
             )
-        return replace(self, members=tuple(members), arrays=arrays, calibration=None, identified=())
+        return replace(
+            self,
+            members=tuple(members),
+            arrays=tuple(arrays),
+            calibration=None,
+            identified=(),
+        )
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""

@@ -60,7 +60,7 @@ from seakeep.models.settings import (
     periods_to_samples,
     prior_of,
 )
-from seakeep.models.training import TrainingArrays, check_names, departing, gather, moments, until
+from seakeep.models.training import RunArrays, check_names, departing, gather, moments, until
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
 
@@ -825,7 +825,10 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             min(draw.first(run, count, input_map) for draw in every)
             for run, count in enumerate(samples)
         ]
-        arrays = TrainingArrays.read(runs, states, inputs, firsts, input_map)
+        arrays = [
+            RunArrays.read(run, name, states, inputs, first, input_map)
+            for (name, run), first in zip(runs.items(), firsts, strict=True)
+        ]
         trained = [
             labelled.channel_matrix(run, inputs, name, slice(first, None))
             for (name, run), first in zip(runs.items(), firsts, strict=True)
@@ -833,15 +836,16 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         ]
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.
-        direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
-        series: Any = arrays.states, arrays.delayed, direct
+        series: Any = [
+            (each.states, each.delayed, each.direct[np.isfinite(each.direct).all(axis=1)])
+            for each in arrays
+        ]
         if shared.centre:
-            series = zip(*departing(zip(*series, strict=True), input_map), strict=True)
-        arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
+            series = departing(series, input_map)
         groups = (labels[0], *input_map.regressors(labels[1]))
         x, u, w = (
             moments(each, group, standardize=False)
-            for each, group in zip(series, groups, strict=True)
+            for each, group in zip(zip(*series, strict=True), groups, strict=True)
         )
         s = max(draw.settings.state_reach for draw in every)
         z = max(draw.settings.input_delays for draw in every)
@@ -851,7 +855,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             settings=shared,
             origin=spec.to_json(),
             members=tuple(members),
-            arrays=arrays,
+            arrays=tuple(replace(each, direct=np.nan_to_num(each.direct)) for each in arrays),
             signature=signature,
             coverage=Coverage.of(inputs, trained, dt),
             centre=centre,

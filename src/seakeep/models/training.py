@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from operator import getitem
 from typing import Any, NamedTuple, Self, cast
 
@@ -341,79 +341,81 @@ def departing(
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingArrays:
-    """What members of an ensemble are identified from, in physical units.
+class RunArrays:
+    """What members of an ensemble learn from a run, in physical units.
 
     Parameters
     ----------
-    names : tuple of str
-        Runs.
-    states, delayed, direct : tuple of ndarray, each (time, channel)
+    name : str
+        The run.
+    states, delayed, direct : ndarray, each (time, channel)
         States and both kinds of regressors, from the earliest sample that a member reads on.
         Regressors end before the run's stop by what the model looks ahead.
-    offsets : tuple of int
-        Sample of the run at which its arrays start.
-    begins : tuple of float
-        Instant of the first sample of the arrays, s.
+    offset : int
+        Sample of the run at which these arrays start.
+    begin : float
+        Instant of their first sample, s.
     """
 
-    names: tuple[str, ...]
-    states: tuple[FloatArray, ...]
-    delayed: tuple[FloatArray, ...]
-    direct: tuple[FloatArray, ...]
-    offsets: tuple[int, ...]
-    begins: tuple[float, ...]
+    name: str
+    states: FloatArray
+    delayed: FloatArray
+    direct: FloatArray
+    offset: int
+    begin: float
 
     @classmethod
     def read(
         cls,
-        runs: Datasets,
+        run: xr.Dataset,
+        name: str,
         states: Sequence[str],
         inputs: Sequence[str],
-        firsts: Sequence[int],
+        first: int,
         input_map: InputMap,
     ) -> Self:
-        """Samples of each run from the first that a member reads on."""
-        read = []
-        for (name, run), first in zip(runs.items(), firsts, strict=True):
-            time = np.asarray(run["time"].values, dtype=float)
-            end = time.size
-            x = labelled.sound_matrix(run, states, name, slice(first, None))
-            span = Span(first, end - 1, max(end - input_map.around.ahead, first))
-            u, v = run_regressors(input_map, run, states, inputs, name, span)
-            for values in (x, u, v):
-                values.flags.writeable = False
-            read.append((name, x, u, v, first, float(time[min(first, end - 1)])))
-        return cls(*zip(*read, strict=True))
+        """Samples of a run from the first that a member reads on."""
+        time = np.asarray(run["time"].values, dtype=float)
+        end = time.size
+        x = labelled.sound_matrix(run, states, name, slice(first, None))
+        span = Span(first, end - 1, max(end - input_map.around.ahead, first))
+        u, v = run_regressors(input_map, run, states, inputs, name, span)
+        for values in (x, u, v):
+            values.flags.writeable = False
+        return cls(name, x, u, v, first, float(time[min(first, end - 1)]))
 
-    def without(self, run: int, begin: int, end: int, dt: float) -> Self:
-        """All but some samples of a run; what lies before and after these are two runs."""
-        read = [*zip(*(getattr(self, each.name) for each in fields(self)), strict=True)]
-        name, states, delayed, direct, offset, start = read[run]
-        read[run : run + 1] = [
-            (name, states[cut], delayed[cut], direct[cut], offset + at, start + at * dt)
+    def without(self, begin: int, end: int, dt: float) -> list[Self]:
+        """What lies before some samples and after them, as two runs where both hold something."""
+        parts = (
+            replace(
+                self,
+                states=self.states[cut],
+                delayed=self.delayed[cut],
+                direct=self.direct[cut],
+                offset=self.offset + at,
+                begin=self.begin + at * dt,
+            )
             for cut, at in ((slice(0, begin), 0), (slice(end, None), end))
-            if len(states[cut])
-        ]
-        return type(self)(*zip(*read, strict=True))
+        )
+        return [each for each in parts if len(each.states)]
 
-    def data(
-        self, settings: HankelSettings, run: int | None, last: int | None, signature: Signature
-    ) -> TrainingData:
-        """What :func:`gather` makes of these runs, or of one of them, with these settings.
 
-        The windows end at a sample of the run, None for the end of what is given.
-        """
-        input_map, pieces = replace(signature.input_map, reference=0), []
-        for each in range(len(self.names)) if run is None else (run,):
-            end = len(self.states[each]) - 1 if last is None else last - self.offsets[each]
-            place, shifted, cut = _place(end, settings, input_map)
-            series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]
-            begin, dt = self.begins[each], signature.dt
-            instants = begin + place.first * dt, begin + end * dt
-            pieces.append(Piece(self.names[each], series, shifted, instants))
-        labels = signature.state_labels, signature.input_labels
-        return _standardised(pieces, signature.dt, labels, input_map, settings)
+def member_data(
+    arrays: Sequence[RunArrays], settings: HankelSettings, last: int | None, signature: Signature
+) -> TrainingData:
+    """What :func:`gather` makes of these runs with the settings of a member.
+
+    The windows end at a sample of the run, None for the end of what is given.
+    """
+    input_map, pieces = replace(signature.input_map, reference=0), []
+    for each in arrays:
+        end = len(each.states) - 1 if last is None else last - each.offset
+        place, shifted, cut = _place(end, settings, input_map)
+        series = each.states[cut], each.delayed[cut], each.direct[cut]
+        instants = each.begin + place.first * signature.dt, each.begin + end * signature.dt
+        pieces.append(Piece(each.name, series, shifted, instants))
+    labels = signature.state_labels, signature.input_labels
+    return _standardised(pieces, signature.dt, labels, input_map, settings)
 
 
 def run_regressors(
