@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ from seakeep.core.bands import (
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
 from seakeep.models.engine import Runs as FreeRuns
-from seakeep.models.engine import Windows, member_series
+from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.forecasts import reduce_members
 from seakeep.models.inputs import Signature
 from seakeep.models.training import RunArrays
@@ -71,16 +71,6 @@ class Ensemble(FreeRuns, Protocol):
     @property
     def read_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant that members have read, of each run, s."""
-
-    def read_windows(
-        self,
-        run: xr.Dataset,
-        starts: Sequence[float],
-        steps: int,
-        ahead: str = "refuse",
-        name: str = "the run",
-    ) -> Windows:
-        """What forecasts from several starts in one run read."""
 
     def without(self, run: str) -> Ensemble:
         """Members as they learn from the other runs."""
@@ -269,7 +259,8 @@ def held_out(
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
         starts = tuple(run["time"].values[places].astype(float).tolist())
-        windows = ensemble.read_windows(run, starts, steps, name=name)
+        asked = [(name, start) for start in starts], steps
+        (windows,) = read_groups(signature, {name: run}, [asked])
         ((series, lost),) = member_series(ensemble, [windows], executor, tell)
         values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)

@@ -256,7 +256,8 @@ class HankelDMDcModel(Model):
         if self.variation is None or not all(each.parameters for each in groups):
             run = partial(linear_runs, [self.dynamics], readouts=self.signature.readouts)
             return weighed_runs(self, run, groups)
-        runs = [np.empty((1, len(each), each.steps, len(self.states))) for each in groups]
+        N = len(self.states)
+        runs = [np.empty((1, len(each.parameters), each.steps, N)) for each in groups]
         for value in sorted({value for each in groups for value in each.parameters}):
             there = [np.array(each.parameters) == value for each in groups]
             computed = self.at(parameter=value).free_runs(groups)
