@@ -318,7 +318,7 @@ def _counted(progress: Progress, before: int, total: int, name: str) -> Progress
 def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[int]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
     whole_number(steps, "steps")
-    time, signature = np.asarray(run["time"].values, dtype=float), ensemble.signature
+    time, signature = run["time"].values.astype(float), ensemble.signature
     slack = 1e-6 * signature.dt
     known = _read_run(ensemble, name, run)
     begin, end = (np.inf, -np.inf) if known is None else ensemble.read_spans[known]
@@ -340,7 +340,7 @@ def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
     A name that was made up for a run without one says nothing.
     """
     spans, signature = ensemble.read_spans, ensemble.signature
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values.astype(float)
     values = labelled.channel_matrix(run, signature.states, name)
     for each in ensemble.arrays:
         if each.name in spans and time.size:

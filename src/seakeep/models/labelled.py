@@ -171,7 +171,7 @@ def opened(
             f"channel {listed} of {name} states no unit; it is taken to be in the model's {units}. "
             "Set its units attribute."
         )
-    return name, np.asarray(variables["time"].values, dtype=float)
+    return name, variables["time"].values.astype(float)
 
 
 def channel_matrix(

@@ -230,7 +230,7 @@ def gather(
     reach = settings.reach(input_map)
     pieces, read = [], []
     for name, run in runs.items():
-        time = np.asarray(run.variables["time"].values, dtype=float)
+        time = run["time"].values.astype(float)
         place, shifted, cut = _place(time.size - 1, settings, input_map)
         _check_length(place, cut.stop - 1, name, settings, reach)
         begin, here = cut.start, labelled.channel_matrix(run, states, name, cut)
@@ -375,7 +375,7 @@ class RunArrays:
         input_map: InputMap,
     ) -> Self:
         """Samples of a run from the first that a member reads on."""
-        time = np.asarray(run["time"].values, dtype=float)
+        time = run["time"].values.astype(float)
         end = time.size
         x = labelled.sound_matrix(run, states, name, slice(first, None))
         span = Span(first, end - 1, max(end - input_map.around.ahead, first))
@@ -471,7 +471,7 @@ def until(runs: Datasets, stop: Stop) -> Groups:
         step = labelled.run_step(run, name)
         out[name] = run
         if (at := stops[name]) is not None:
-            time = np.asarray(run["time"].values, dtype=float)
+            time = run["time"].values.astype(float)
             last = labelled.nearest_sample(time, at, name, "stop")
             # "up to and including": a sample later than the stop by more than rounding is not.
             last -= last > 0 and time[last] > float(at) + 1e-3 * step

@@ -334,7 +334,7 @@ def outside_training(
         return []
     signature: Signature = model.signature
     name = labelled.run_name(run, "the run")
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values.astype(float)
     at = labelled.nearest_sample(time, start, name)
     first = max(at - signature.input_delays, 0)
     values = labelled.channel_matrix(run, coverage.channels, name, slice(first, at + steps))
