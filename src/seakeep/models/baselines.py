@@ -151,6 +151,11 @@ class LinearSpec(Plain):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> HankelDMDcModel:
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
+        if self.is_filter and not inputs:
+            raise RequestError(
+                f"a {self.kind.upper()} model is a filter of its inputs and has none; name at "
+                "least one input."
+            )
         named = as_runs(runs)
         spec = self.resolved_in(named, inputs)
         if self.ridge != "rollout":
@@ -264,16 +269,6 @@ class FIR(LinearSpec):
     def recommended(cls, encounter_period: float, dt: float) -> Self:
         """Up to three encounter periods of the inputs, and λ, chosen on held-out data."""
         return cls(input_delays=periods_to_samples(3, encounter_period, dt), ridge="rollout")
-
-    def fit(
-        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
-    ) -> HankelDMDcModel:
-        """Fit the filter; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        if not inputs:
-            raise RequestError(
-                "a FIR model is a filter of its inputs and has none; name at least one input."
-            )
-        return super().fit(runs, states, inputs, stop)
 
     def solve(self, data: TrainingData) -> Solution:
         """Filters of the inputs, beside zeros for the states."""

@@ -42,7 +42,6 @@ from seakeep.models.calibration import (
 )
 from seakeep.models.engine import Dynamics, Series, Windows, linear_runs, member_series
 from seakeep.models.forecasts import (
-    Model,
     check_arrays,
     counted,
     forecast_attrs,
@@ -58,7 +57,7 @@ from seakeep.models.growth import LeadErrors, Stretch, linear_errors
 from seakeep.models.inputs import InputMap, Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
-from seakeep.models.live import Live
+from seakeep.models.live import Servable
 from seakeep.models.settings import HankelSettings, unit_of
 from seakeep.models.training import RunArrays, TrainingData, departing, member_data
 from seakeep.models.validity import Coverage
@@ -150,7 +149,7 @@ class BandForecast(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class HankelEnsemble(Model):
+class HankelEnsemble(Servable):
     """Ensemble of models that differ in their settings or their training data.
 
     Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
@@ -687,20 +686,11 @@ class HankelEnsemble(Model):
         mean, std, lower, upper = values[0]
         return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
-    def live(
-        self,
-        *,
-        like: xr.Dataset | None = None,
-        noise: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-    ) -> Live:
-        """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
-
-        The filter predicts with the mean of the members, or with what they are centred on, whose
-        errors on what they learnt from are found here; a forecast runs all of them.
-        """
-        members = self.hold()
-        return Live(members, members._means, members.errors, like=like, noise=noise, roles=roles)
+    @property
+    def _serving(self) -> tuple[Self, list[Dynamics], LeadErrors | None]:
+        """What forecasts in service, what its filter predicts with, and errors in training."""
+        held = self.hold()
+        return held, held._means, held.errors
 
     @property
     def _means(self) -> list[Dynamics]:

@@ -26,11 +26,11 @@ from seakeep.core.solve import Solution, ridge_path
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import engine, export, labelled, store
 from seakeep.models.engine import Dynamics, Windows, linear_runs, parameter_of
-from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name, weighed_runs
+from seakeep.models.forecasts import check_arrays, counted, rows_by_name, weighed_runs
 from seakeep.models.growth import LeadErrors, linear_errors, stretches_of
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
-from seakeep.models.live import Live
+from seakeep.models.live import Servable
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData, system_of
@@ -82,7 +82,7 @@ class Variation:
 
 
 @dataclass(frozen=True, eq=False)
-class HankelDMDcModel(Model):
+class HankelDMDcModel(Servable):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
 
     Parameters
@@ -111,8 +111,9 @@ class HankelDMDcModel(Model):
     signature: Signature = field(repr=False)
     coverage: Coverage = field(repr=False)
     coefficients: FloatArray = field(repr=False)
-    learnt: LeadErrors | tuple[TrainingData, Datasets] | HankelDMDcModel | None = field(
-        default=None, repr=False
+    # Hints are read by the store, which cannot look into the name of a mapping of runs.
+    learnt: LeadErrors | tuple[TrainingData, Mapping[str, xr.Dataset]] | HankelDMDcModel | None = (
+        field(default=None, repr=False)
     )
     selection: str = ""
     variation: Variation | None = field(default=None, repr=False)
@@ -438,31 +439,10 @@ class HankelDMDcModel(Model):
             parts.append(((high - low) / (2 * steps[:, None])).T.reshape(-1, *values.shape))
         return parts[0], parts[1]
 
-    def live(
-        self,
-        *,
-        like: xr.Dataset | None = None,
-        noise: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-    ) -> Live:
-        """Put the model into service: samples in one at a time, estimates and forecasts out.
-
-        Parameters
-        ----------
-        like, noise, roles
-            As in :class:`seakeep.models.Live`.
-
-        Returns
-        -------
-        Live
-            Without samples yet.
-
-        Raises
-        ------
-        RequestError
-            If the model holds no errors of its training, or an argument is out of range.
-        """
-        return Live(self, [self.dynamics], self.errors, like=like, noise=noise, roles=roles)
+    @property
+    def _serving(self) -> tuple[Self, list[Dynamics], LeadErrors | None]:
+        """What forecasts in service, what its filter predicts with, and errors in training."""
+        return self, [self.dynamics], self.errors
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.
