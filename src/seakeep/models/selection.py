@@ -37,10 +37,11 @@ from seakeep.core.solve import ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.executor import in_order
 from seakeep.models import labelled
-from seakeep.models.candidates import Candidates, Columns, Given, Step, alignments_of
+from seakeep.models.candidates import Candidates, Columns, Step, alignments_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.inputs import Signature
+from seakeep.models.labelled import Given
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
@@ -406,14 +407,13 @@ def _problem(
     split into.
     """
     widest = replace(widest, ridge=1.0, standardize=True)
-    runs, states, inputs = given
-    chain = widest.input_map(runs, states, inputs, widest.window)
+    chain = widest.input_map(given, widest.window)
     before = widest.reach(chain)
     after = chain.around.after
-    pieces = dict(runs)
+    pieces = dict(given.runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
         pieces = {}
-        for name, run in runs.items():
+        for name, run in given.runs.items():
             size = run.sizes["time"]
             place = training_window(size - 1, widest.window, before, 0, widest.history)
             edges = np.linspace(place.first_column, size - after, folds + 1).astype(int)
@@ -424,7 +424,7 @@ def _problem(
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
     known = None if isinstance(folds, int) else chain
-    data = gather(pieces, states, inputs, None, widest, known)
+    data = gather(given._replace(runs=pieces), widest, known)
     groups = tuple(pieces if isinstance(folds, int) else folds.values())
     return Problem(pieces, groups, data, widest, horizons)
 
@@ -649,21 +649,15 @@ class Selected(Generic[Chosen]):
         return "\n".join(lines)
 
 
-def settle(
-    settings: Settings,
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    **how: Any,
-) -> Selected[Settings]:
+def settle(settings: Settings, given: Given, **how: Any) -> Selected[Settings]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
     settings : HankelSettings
         What was asked for; its ``select`` says what is chosen beside λ, and how.
-    runs, states, inputs
-        As in :func:`select`.
+    given : Given
+        Training runs and channels.
     **how
         Its ``kinds``, ``executor`` and ``progress``.
 
@@ -677,7 +671,7 @@ def settle(
     RequestError
         As :func:`select`; if λ is stated as zero and something is to be chosen.
     """
-    lacking = _lacking(settings, (runs, states, inputs))
+    lacking = _lacking(settings, given)
     without = f"not aligned to the surge: {lacking}" if lacking else ""
     stated, chosen = not isinstance(settings.ridge, str), getattr(settings, "select", None)
     if stated and chosen is None:
@@ -690,9 +684,7 @@ def settle(
     asked = chosen or Select()
     selected = select(
         settings,
-        runs,
-        states,
-        inputs,
+        *given,
         vary=["readouts"] * (settings.readouts == "auto"),
         opened=asked.opened,
         ridges=(float(settings.ridge),) if stated else None,
@@ -775,7 +767,7 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
-    given = runs, states, inputs
+    given = Given(runs, states, inputs)
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
     _check_asked(settings, vary)
@@ -902,7 +894,7 @@ def _rivalled(
     own = {"ridge"} if is_varied else {"ridge", "observables"}
     plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
     before = {*made}
-    rivals = [each.having(**plain) for each in kinds if search.given[2]]
+    rivals = [each.having(**plain) for each in kinds if search.given.inputs]
     slow = [each for each in rivals if not (is_varied or each.has_path)]
     both.judge(each for each in rivals if each not in slow)
     for rival in slow:
@@ -1003,25 +995,18 @@ def _learnt(
         held = problem.held_out(candidate, level, steps)
         return fit_readouts(readouts, problem.data, problem.runs, held)
     settings = replace(candidate, ridge=1.0, standardize=True)
-    return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
+    return fit_readouts(readouts, gather(given, settings), given.runs, ())
 
 
-def readouts_for(
-    settings: HankelSettings,
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-) -> tuple[FittedReadOut, ...]:
+def readouts_for(settings: HankelSettings, given: Given) -> tuple[FittedReadOut, ...]:
     """Fit the read-outs of settings that leave nothing else to be chosen.
 
     Parameters
     ----------
     settings : HankelSettings
         Delays, λ and input maps as stated.
-    runs : mapping of str to Dataset
-        Training runs, cut at the end of their training windows.
-    states, inputs : sequence of str
-        Channels.
+    given : Given
+        Training runs and channels.
 
     Returns
     -------
@@ -1033,7 +1018,7 @@ def readouts_for(
         If a read-out names what is no state, λ is zero where forecasts are cross-fitted, or kind
         "wave" meets no waves that are carried to the predicted surge.
     """
-    given = runs, states, inputs
+    runs, states, inputs = given
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
     if "auto" not in readouts.values():
         return _learnt(readouts, None, settings, 0.0, 0, given)

@@ -32,6 +32,7 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean, quiet, warn
 from seakeep.models import labelled, store
 from seakeep.models.alignment import BACK, Following, ProbeAlignment
 from seakeep.models.inputs import InputMap
+from seakeep.models.labelled import Given
 from seakeep.models.observables import NOTHING, Observed, observables_of
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.models.terms import Observable
@@ -662,25 +663,19 @@ class HankelSettings:
             return None
         return STABLE_RADIUS if self.stable is True else float(self.stable)
 
-    def input_map(
-        self,
-        runs: Datasets,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> InputMap:
+    def input_map(self, given: Given, window: int | None) -> InputMap:
         """Fit the input map to training runs that end where training ends.
 
         Observables of a model that follows its own surge are made of waves without look-ahead.
         """
         aligned, observed = None, NOTHING
         if self.alignment is not None:
-            aligned = self.alignment.fit(runs, states, inputs, window)
+            aligned = self.alignment.fit(*given, window)
         if self.observables:
-            observed = Observed.fit(self.observables, runs, inputs, window)
+            observed = Observed.fit(self.observables, given.runs, given.inputs, window)
         if aligned is None or aligned.settings.surge != "predicted":
             return InputMap(aligned, self.lead, observed)
-        follows = Following.fit(aligned, runs, states, window, self.lead)
+        follows = Following.fit(aligned, given.runs, given.states, window, self.lead)
         return InputMap(aligned, observed=observed, follows=follows)
 
     @property

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from operator import getitem
-from typing import Any, NamedTuple, Self, cast
+from typing import NamedTuple, Self
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Groups, undefined
+from seakeep.arrays import FloatArray, undefined
 from seakeep.core.embedding import (
     Delayed,
     PrimalSystem,
@@ -22,10 +21,10 @@ from seakeep.core.embedding import (
     training_window,
 )
 from seakeep.core.solve import Method, Solution, identify
-from seakeep.errors import DataError, RequestError, did_you_mean, warn
+from seakeep.errors import DataError, warn
 from seakeep.models import labelled
 from seakeep.models.inputs import InputMap, Regressors, Scale, Signature
-from seakeep.models.labelled import ChannelLabel, Span, Stop
+from seakeep.models.labelled import ChannelLabel, Given, Span
 from seakeep.models.settings import HankelSettings
 
 
@@ -187,23 +186,14 @@ def system_of(
 
 
 def gather(
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    stop: Stop,
-    settings: HankelSettings,
-    input_map: InputMap | None = None,
+    given: Given, settings: HankelSettings, input_map: InputMap | None = None
 ) -> TrainingData:
     """Fit the input map, and collect the training windows of the runs.
 
     Parameters
     ----------
-    runs : mapping of str to Dataset
-        Runs, at least one.
-    states, inputs : sequence of str
-        Channels.
-    stop : float, sequence or mapping of float, optional
-        Last instants, s.
+    given : Given
+        Runs, at least one, and channels.
     settings : HankelSettings
         Input maps, delays, window and scaling.
     input_map : InputMap, optional
@@ -217,16 +207,14 @@ def gather(
     Raises
     ------
     RequestError
-        If names are unknown, repeated or missing, or a stop lies outside its run.
+        If a channel is not known.
     DataError
         If a run is too short, has gaps, another time step, other units, or a constant channel.
     """
-    check_names(states, inputs)
-    states, inputs = list(states), list(inputs)  # arrays of names are welcome too
+    runs, states, inputs = given
     dt = labelled.common_step(runs)
-    runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    input_map = input_map or settings.input_map(runs, states, inputs, settings.window)
+    input_map = input_map or settings.input_map(given, settings.window)
     reach = settings.reach(input_map)
     pieces, read = [], []
     for name, run in runs.items():
@@ -442,91 +430,6 @@ def run_regressors(
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
     rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
-
-
-def until(runs: Datasets, stop: Stop) -> Groups:
-    """Cut runs at the last instants of their training windows.
-
-    Parameters
-    ----------
-    runs : mapping of str to Dataset
-        Runs.
-    stop : float, sequence or mapping of float, optional
-        Last instants, s.
-
-    Returns
-    -------
-    dict of str to Dataset
-        The runs up to and including these instants.
-
-    Raises
-    ------
-    RequestError
-        If a stop lies outside its run.
-    DataError
-        If the times of a run are not uniform.
-    """
-    stops, out = _stops_by_run(stop, list(runs)), {}
-    for name, run in runs.items():
-        step = labelled.run_step(run, name)
-        out[name] = run
-        if (at := stops[name]) is not None:
-            time = run["time"].values.astype(float)
-            last = labelled.nearest_sample(time, at, name, "stop")
-            # "up to and including": a sample later than the stop by more than rounding is not.
-            last -= last > 0 and time[last] > float(at) + 1e-3 * step
-            out[name] = run.isel(time=slice(0, last + 1))
-    return out
-
-
-def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
-    """Refuse lists of channels that are strings, empty, repeated or overlapping."""
-    for what, names in (("states", states), ("inputs", inputs)):
-        if isinstance(names, str):
-            raise RequestError(
-                f"{what} must be a list of channel names; received the string '{names}'. "
-                f"Write {what}=['{names}']."
-            )
-        listed = isinstance(cast("object", names), Iterable)
-        if not listed or not all(isinstance(cast("object", name), str) for name in names):
-            raise RequestError(
-                f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
-                "model without input takes inputs=[]."
-            )
-        double = {name for name in names if list(names).count(name) > 1}
-        if double:
-            raise RequestError(
-                f"{what} names {', '.join(sorted(double))} more than once. Name each channel once."
-            )
-    if len(states) == 0:
-        raise RequestError("states is empty: name at least one channel to forecast.")
-    both = set(states) & set(inputs)
-    if both:
-        raise RequestError(
-            f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and an "
-            "input is given: choose one."
-        )
-
-
-def _stops_by_run(stop: Any, names: list[str]) -> dict[str, Any]:
-    """Last instant of each run's window as the user gave it; None for the run's end."""
-    if isinstance(stop, Mapping):
-        unknown = [name for name in stop if name not in names]
-        if unknown:
-            raise RequestError(
-                f"stop names the run '{unknown[0]}', which is not among the runs "
-                f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
-            )
-        return {name: stop.get(name) for name in names}
-    if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = list(stop)
-        if len(values) != len(names):
-            raise RequestError(
-                f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
-                "one per run."
-            )
-        return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, stop)
 
 
 def _warn_of_dead(
