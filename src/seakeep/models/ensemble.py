@@ -15,7 +15,7 @@ and counted.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -222,7 +222,26 @@ class HankelEnsemble(Servable):
         run), ``ridge``, the run that trains (−1 for all) and its last sample (−1 for ``stop``),
         and how many infeasible draws came before.
         """
-        return draws_dataset(self.members, self.origin)
+        drawn = np.array([draw.drawn for draw in self.members], dtype=float)
+        variables: dict[str, Any] = {
+            name: ("member", values, {"long_name": label, "units": unit_of(self.origin[name])})
+            for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
+        }
+        ridge = np.array([draw.settings.ridge for draw in self.members], dtype=float)
+        variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
+        rows = [
+            (each.window, each.state_delays, each.input_delays, draw.run, draw.last, draw.redrawn)
+            for draw in self.members
+            for each in (draw.settings,)
+        ]
+        for (name, label), column in zip(INTEGERS.items(), zip(*rows, strict=True), strict=True):
+            values = np.array([-1 if each is None else each for each in column], dtype=np.int64)
+            variables[name] = ("member", values, {"long_name": label, "units": "1"})
+        attrs = {
+            "ensemble": json.dumps(self.origin),
+            "redrawn": sum(draw.redrawn for draw in self.members),
+        }
+        return xr.Dataset(variables, coords={"member": np.arange(self.n_members)}, attrs=attrs)
 
     @cached_property
     def training_spans(self) -> dict[str, tuple[float, float]]:
@@ -1007,32 +1026,8 @@ INTEGERS = {
 }
 
 
-def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
-    """Draws over ``member``; see ``HankelEnsemble.draws``."""
-    drawn = np.array([draw.drawn for draw in members], dtype=float)
-    variables: dict[str, Any] = {
-        name: ("member", values, {"long_name": label, "units": unit_of(origin[name])})
-        for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
-    }
-    ridge = np.array([draw.settings.ridge for draw in members], dtype=float)
-    variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
-    rows = [
-        (each.window, each.state_delays, each.input_delays, draw.run, draw.last, draw.redrawn)
-        for draw in members
-        for each in (draw.settings,)
-    ]
-    for (name, label), column in zip(INTEGERS.items(), zip(*rows, strict=True), strict=True):
-        values = np.array([-1 if each is None else each for each in column], dtype=np.int64)
-        variables[name] = ("member", values, {"long_name": label, "units": "1"})
-    attrs = {
-        "ensemble": json.dumps(dict(origin)),
-        "redrawn": sum(draw.redrawn for draw in members),
-    }
-    return xr.Dataset(variables, coords={"member": np.arange(len(members))}, attrs=attrs)
-
-
 def draws_of(dataset: xr.Dataset, shared: HankelSettings) -> tuple[Draw, ...]:
-    """Rebuild draws from :func:`draws_dataset` and what all members share."""
+    """Rebuild draws from those of a file and what all members share."""
     columns = (dataset[name].values.tolist() for name in ("ridge", *INTEGERS))
     rows = zip(*columns, strict=True)
     drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)

@@ -93,9 +93,35 @@ class Given(NamedTuple):
 
     @classmethod
     def of(cls, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop) -> Self:
-        """What a user gives to train with; arguments and errors as :meth:`HankelDMDc.fit`."""
+        """What a user gives to train with; arguments and errors as :meth:`HankelDMDc.fit`.
+
+        Lists of channels that are strings, empty, repeated or overlapping are refused.
+        """
         named = until(as_runs(runs), stop)
-        check_names(states, inputs)
+        for what, names in (("states", states), ("inputs", inputs)):
+            if isinstance(names, str):
+                raise RequestError(
+                    f"{what} must be a list of channel names; received the string '{names}'. "
+                    f"Write {what}=['{names}']."
+                )
+            listed = isinstance(cast("object", names), Iterable)
+            if not listed or not all(isinstance(cast("object", name), str) for name in names):
+                raise RequestError(
+                    f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
+                    "model without input takes inputs=[]."
+                )
+            if double := {name for name in names if list(names).count(name) > 1}:
+                raise RequestError(
+                    f"{what} names {', '.join(sorted(double))} more than once. Name each channel "
+                    "once."
+                )
+        if len(states) == 0:
+            raise RequestError("states is empty: name at least one channel to forecast.")
+        if both := set(states) & set(inputs):
+            raise RequestError(
+                f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and "
+                "an input is given: choose one."
+            )
         return cls(named, list(states), list(inputs))  # arrays of names are welcome too
 
 
@@ -121,67 +147,34 @@ def until(runs: Datasets, stop: Stop) -> Groups:
     DataError
         If the times of a run are not uniform.
     """
-    stops, out = _stops_by_run(stop, list(runs)), {}
-    for name, run in runs.items():
+    given: Any = stop
+    names, out = list(runs), {}
+    if isinstance(given, Mapping):
+        if unknown := [name for name in given if name not in names]:
+            raise RequestError(
+                f"stop names the run '{unknown[0]}', which is not among the runs "
+                f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
+            )
+        stops = [given.get(name) for name in names]
+    elif np.ndim(given) > 0:  # a scalar array, such as an instant of a run, is one for all
+        stops = list(given)
+        if len(stops) != len(names):
+            raise RequestError(
+                f"stop has {len(stops)} instants for {len(names)} runs; give one for all, or "
+                "one per run."
+            )
+    else:
+        stops = [given] * len(names)
+    for (name, run), at in zip(runs.items(), stops, strict=True):
         step = run_step(run, name)
         out[name] = run
-        if (at := stops[name]) is not None:
+        if at is not None:
             time = run["time"].values.astype(float)
             last = nearest_sample(time, at, name, "stop")
             # "up to and including": a sample later than the stop by more than rounding is not.
             last -= last > 0 and time[last] > float(at) + 1e-3 * step
             out[name] = run.isel(time=slice(0, last + 1))
     return out
-
-
-def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
-    """Refuse lists of channels that are strings, empty, repeated or overlapping."""
-    for what, names in (("states", states), ("inputs", inputs)):
-        if isinstance(names, str):
-            raise RequestError(
-                f"{what} must be a list of channel names; received the string '{names}'. "
-                f"Write {what}=['{names}']."
-            )
-        listed = isinstance(cast("object", names), Iterable)
-        if not listed or not all(isinstance(cast("object", name), str) for name in names):
-            raise RequestError(
-                f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
-                "model without input takes inputs=[]."
-            )
-        double = {name for name in names if list(names).count(name) > 1}
-        if double:
-            raise RequestError(
-                f"{what} names {', '.join(sorted(double))} more than once. Name each channel once."
-            )
-    if len(states) == 0:
-        raise RequestError("states is empty: name at least one channel to forecast.")
-    both = set(states) & set(inputs)
-    if both:
-        raise RequestError(
-            f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and an "
-            "input is given: choose one."
-        )
-
-
-def _stops_by_run(stop: Any, names: list[str]) -> dict[str, Any]:
-    """Last instant of each run's window as the user gave it; None for the run's end."""
-    if isinstance(stop, Mapping):
-        unknown = [name for name in stop if name not in names]
-        if unknown:
-            raise RequestError(
-                f"stop names the run '{unknown[0]}', which is not among the runs "
-                f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
-            )
-        return {name: stop.get(name) for name in names}
-    if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = list(stop)
-        if len(values) != len(names):
-            raise RequestError(
-                f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
-                "one per run."
-            )
-        return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, stop)
 
 
 def is_made_up(name: str, run: xr.Dataset) -> bool:
