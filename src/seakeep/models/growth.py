@@ -224,5 +224,5 @@ def stretches_of(data: TrainingData, signature: Signature, runs: Datasets) -> li
         if input_map.reference:  # which the run holds before a start, not the window
             skipped = round((data.begin(number) - float(runs[name]["time"][0])) / signature.dt)
             first = max(first, signature.history_samples - 1 - skipped)
-        stretches.append(Stretch(*own, first, window.last, source, data.zero(number)))
+        stretches.append(Stretch(*own, first, window.last, source, data.zeros[number]))
     return stretches

@@ -161,9 +161,14 @@ class HankelDMDcModel(Servable):
         data, runs = self.learnt
         if self.variation is None:
             return self._errors_in(data, runs)
-        parts = data_by_value(data, runs, self.signature.parameter)
-        each = [self.at(parameter=value)._errors_in(part, runs) for value, part in parts.items()]
-        known = [errors for errors in each if errors is not None]
+        values = [parameter_of(runs[name], self.signature.parameter, name) for name in data.names]
+        by_run = [each.name for each in fields(data) if each.name != "signature"]
+        known = []
+        for value in sorted(set(values)):
+            here = [each == value for each in values]
+            own: Any = {each: tuple(compress(getattr(data, each), here)) for each in by_run}
+            errors = self.at(parameter=value)._errors_in(replace(data, **own), runs)
+            known += [] if errors is None else [errors]
         return LeadErrors.together(known) if known else None
 
     def _errors_in(self, data: TrainingData, runs: Datasets) -> LeadErrors | None:
@@ -740,15 +745,3 @@ def regress_varying(
     signature = replace(data.signature.scaled(*scales), parameter=parameter)
     data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
-
-
-def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
-    """Training data of the runs at each value of a parameter."""
-    values = [parameter_of(runs[name], parameter, name) for name in data.names]
-    by_run = [each.name for each in fields(data) if each.name != "signature"]
-    out = {}
-    for value in sorted(set(values)):
-        here = [each == value for each in values]
-        own: Any = {each: tuple(compress(getattr(data, each), here)) for each in by_run}
-        out[value] = replace(data, **own)
-    return out

@@ -326,7 +326,7 @@ class Problem:
                 starts = new[windows.steps]
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
                 # Read-outs are learnt from departures.
-                found.append((starts, *windows.departing(measured, data.zero(run))))
+                found.append((starts, *windows.departing(measured, data.zeros[run])))
             if len(self.groups) <= FEW:
                 self.read[key] = found
         return found

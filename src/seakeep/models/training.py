@@ -78,7 +78,7 @@ class TrainingData:
         First and last instant of each window, s.
     inputs : tuple of ndarray, each (time, Q)
         Measured inputs of the windows, physical units.
-    zeros : tuple of ndarray, each (N,)
+    zeros : tuple of ndarray, each (N,), or zero
         What the states of each run depart from, physical units.
     """
 
@@ -90,11 +90,7 @@ class TrainingData:
     windows: tuple[TrainingWindow, ...]
     instants: tuple[tuple[float, float], ...]
     inputs: tuple[FloatArray, ...] = ()
-    zeros: tuple[FloatArray, ...] = ()
-
-    def zero(self, run: int) -> FloatArray | float:
-        """What the states of a run depart from, physical units."""
-        return self.zeros[run] if self.zeros else 0.0
+    zeros: tuple[FloatArray | float, ...] = ()
 
     def begin(self, run: int) -> float:
         """Instant of the first sample of a run's arrays, s."""
@@ -270,7 +266,7 @@ def _standardised(
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
     names, series, windows, instants = zip(*pieces, strict=True)
-    zeros: tuple[FloatArray, ...] = ()
+    zeros: tuple[FloatArray | float, ...] = (0.0,) * len(names)
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
     # A look-ahead leaves the last row, which is no column, without regressors.
