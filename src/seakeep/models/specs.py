@@ -797,13 +797,13 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             for run, count in enumerate(samples)
         ]
         arrays = [
-            RunArrays.read(run, name, states, inputs, first, input_map)
-            for (name, run), first in zip(runs.items(), firsts, strict=True)
+            RunArrays.read(given, name, first, input_map)
+            for name, first in zip(runs, firsts, strict=True)
         ]
         trained = [
-            labelled.channel_matrix(run, inputs, name, slice(first, None))
-            for (name, run), first in zip(runs.items(), firsts, strict=True)
-            if first < run.sizes["time"]
+            labelled.channel_matrix(runs[each.name], inputs, each.name, slice(each.offset, None))
+            for each in arrays
+            if len(each.states)
         ]
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.

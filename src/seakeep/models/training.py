@@ -8,7 +8,6 @@ from operator import getitem
 from typing import NamedTuple, Self
 
 import numpy as np
-import xarray as xr
 
 from seakeep.arrays import FloatArray, undefined
 from seakeep.core.embedding import (
@@ -222,7 +221,7 @@ def gather(
         labelled.check_finite(here[needed - begin :], states, run, name, needed)
         needed = min(place.first, place.first_column - settings.input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.around.ahead)
-        regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
+        regressors = run_regressors(input_map, given, name, span, needed)
         instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *regressors), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
@@ -349,21 +348,14 @@ class RunArrays:
     begin: float
 
     @classmethod
-    def read(
-        cls,
-        run: xr.Dataset,
-        name: str,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        first: int,
-        input_map: InputMap,
-    ) -> Self:
+    def read(cls, given: Given, name: str, first: int, input_map: InputMap) -> Self:
         """Samples of a run from the first that a member reads on."""
+        run = given.runs[name]
         time = run["time"].values.astype(float)
         end = time.size
-        x = labelled.sound_matrix(run, states, name, slice(first, None))
+        x = labelled.sound_matrix(run, given.states, name, slice(first, None))
         span = Span(first, end - 1, max(end - input_map.around.ahead, first))
-        u, v = run_regressors(input_map, run, states, inputs, name, span)
+        u, v = run_regressors(input_map, given, name, span)
         for values in (x, u, v):
             values.flags.writeable = False
         return cls(name, x, u, v, first, float(time[min(first, end - 1)]))
@@ -403,15 +395,10 @@ def member_data(
 
 
 def run_regressors(
-    input_map: InputMap,
-    run: xr.Dataset,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    name: str,
-    span: Span,
-    needed: int | None = None,
+    input_map: InputMap, given: Given, name: str, span: Span, needed: int | None = None
 ) -> Regressors:
     """Regressors of a training run; inputs as they are may have gaps before `needed`."""
+    run, inputs = given.runs[name], given.inputs
     # A map that reaches back has no rows at the start of a run; no column reads those.
     missing = max(0, -input_map.reads(span).first)
     span = span._replace(first=span.first + missing)
@@ -423,7 +410,7 @@ def run_regressors(
     labelled.check_finite(values[first : read.stop], inputs, run, name, first)
     surge = None
     if (follows := input_map.follows) is not None:
-        surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
+        surge = labelled.channel_matrix(run, [given.states[follows.column]], name)[:, 0]
     rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
