@@ -97,7 +97,6 @@ class Given(NamedTuple):
 
         Lists of channels that are strings, empty, repeated or overlapping are refused.
         """
-        named = until(as_runs(runs), stop)
         for what, names in (("states", states), ("inputs", inputs)):
             if isinstance(names, str):
                 raise RequestError(
@@ -122,7 +121,8 @@ class Given(NamedTuple):
                 f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and "
                 "an input is given: choose one."
             )
-        return cls(named, list(states), list(inputs))  # arrays of names are welcome too
+        # Arrays of names are welcome too.
+        return cls(until(as_runs(runs), stop), list(states), list(inputs))
 
 
 def until(runs: Datasets, stop: Stop) -> Groups:

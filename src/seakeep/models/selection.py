@@ -147,7 +147,7 @@ class Trial:
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
         near = self.means <= (1.0 + alike) * self.best
-        levels = [level for level, is_near in zip(self.levels, near, strict=True) if is_near]
+        levels: list[float] = np.array(self.levels)[near].tolist()
         return stated if stated in levels else levels[-1]
 
     def at(self, level: float) -> float:
