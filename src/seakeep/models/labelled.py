@@ -147,24 +147,24 @@ def until(runs: Datasets, stop: Stop) -> Groups:
     DataError
         If the times of a run are not uniform.
     """
-    given: Any = stop
+    asked: Any = stop
     names, out = list(runs), {}
-    if isinstance(given, Mapping):
-        if unknown := [name for name in given if name not in names]:
+    if isinstance(asked, Mapping):
+        if unknown := [name for name in asked if name not in names]:
             raise RequestError(
                 f"stop names the run '{unknown[0]}', which is not among the runs "
                 f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
             )
-        stops = [given.get(name) for name in names]
-    elif np.ndim(given) > 0:  # a scalar array, such as an instant of a run, is one for all
-        stops = list(given)
+        stops = [asked.get(name) for name in names]
+    elif np.ndim(asked) > 0:  # a scalar array, such as an instant of a run, is one for all
+        stops = list(asked)
         if len(stops) != len(names):
             raise RequestError(
                 f"stop has {len(stops)} instants for {len(names)} runs; give one for all, or "
                 "one per run."
             )
     else:
-        stops = [given] * len(names)
+        stops = [asked] * len(names)
     for (name, run), at in zip(runs.items(), stops, strict=True):
         step = run_step(run, name)
         out[name] = run
