@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from seakeep.arrays import Datasets, Groups
 
-FORMAT = 15
+FORMAT = 16
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word somewhere in a text or picture: ``KIND``."""

@@ -18,12 +18,11 @@ from seakeep.errors import RequestError
 from seakeep.files import read_bytes, write_text
 from seakeep.models import HankelDMDc
 from seakeep.models.baselines import RIVALS
-from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
+from seakeep.models.labelled import Given, Runs, Stop, channel_matrix
 from seakeep.models.readouts import readouts_json
 from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds, HankelSettings, Select
 from seakeep.models.specs import largest_radius
-from seakeep.models.training import check_names, until
 from seakeep.toml import Length
 
 if TYPE_CHECKING:
@@ -172,13 +171,12 @@ def tune(
             f"folds must be {', '.join(map(repr, FOLDS))} or an integer of at least 2; received "
             f"{folds!r}."
         )
-    check_names(states, inputs)
-    named = until(as_runs(runs), stop)
+    given = Given.of(runs, states, inputs, stop)
     known: MutableMapping[str, Any] = {}
     if resume is not None:
         asked = [spec.to_json(), sorted(vary), list(horizon), folds]
-        known = _Scores(Path(resume), _digest(asked, named, [*states, *inputs]))
-    spec, given = spec.resolved_in(named, inputs), (named, list(states), list(inputs))
+        known = _Scores(Path(resume), _digest(asked, given.runs, [*states, *inputs]))
+    spec = spec.resolved_in(given.runs, given.inputs)
     open_to = spec.select or Select()
     found = select(
         spec,
@@ -196,7 +194,7 @@ def tune(
     settings, note = found.settings.having(select=None), found.note
     if getattr(settings, "parameter", ""):  # which the search leaves out, as pooled models do
         start = spec.settled(*given, executor=executor).settings
-        every = spec.variants(*given, start, settings)
+        every = spec.variants(given, start, settings)
         sound = (each for each in every if largest_radius(each[0].fit(*given)) < 1.0)
         settings, words = next(sound, every[-1])
         note = words + note

@@ -41,7 +41,7 @@ class Problem:
     def delayed(self):
         """What the fast paths take."""
         groups = (self.states, self.s), (self.inputs, self.z), (self.direct, 0)
-        return Delayed.of(self.states, groups, self.windows)
+        return Delayed(self.states, groups, self.windows)
 
     def solved(self, ridge, **options):
         settings = {"state_delays": self.s, "input_delays": self.z, "direct": self.direct}

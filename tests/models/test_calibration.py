@@ -187,7 +187,7 @@ def test_a_run_that_repeats_the_judged_one_does_not_train():
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     ensemble = pooled("runs", seas("ab"))
     without = ensemble.without("a")
-    assert without.arrays.names == ("b",)
+    assert [each.name for each in without.arrays] == ["b"]
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]
     assert 0 < without.n_members == len(kept) < 6
     assert_kept(without, ensemble, kept)
@@ -208,7 +208,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
 
 def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
     ensemble = pooled("windows", {"a": sea(0, 900, "a")}, Uniform("4 T", "8 T"))
-    before = ensemble.arrays.offsets[0]  # samples that no member reads
+    before = ensemble.arrays[0].offset  # samples that no member reads
     kept = ensemble.without_part(300 - before, 600 - before)
     spans = [(d.first(0, 900, ensemble.signature.input_map), d.last) for d in ensemble.members]
     free = [number for number, (first, last) in enumerate(spans) if last < 300 or first >= 600]

@@ -128,7 +128,7 @@ def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch, count
     assert (len(made) == count) == (count == selection.FEW)
     for each in one.read.values():
         for starts, windows, measured in each:
-            assert len(windows) == len(starts) == len(measured)
+            assert len(windows.histories) == len(starts) == len(measured)
     # Longer ones are others, which are read anew.
     longer = 2 * max(one.horizons)
     judged = [each.predicted.shape for each in one.held_out(found.settings, 1e-3, longer)]

@@ -218,7 +218,7 @@ def test_training_spans_are_those_of_the_members(run):
 
 def test_forecasts_carry_the_spread_that_tells_a_slack_channel(run):
     ensemble = fitted(run)
-    pooled = np.concatenate(ensemble.arrays.states).std(axis=0, ddof=1)
+    pooled = np.concatenate([each.states for each in ensemble.arrays]).std(axis=0, ddof=1)
     for forecast in (
         ensemble.forecast(run, 65.0, 5),
         ensemble.forecast_summary(run, 65.0, 5),

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, Powers, SlowSquares
-from seakeep.models.labelled import ChannelLabel, Span, channel_labels
+from seakeep.models.labelled import ChannelLabel, Given, Span, channel_labels
 from seakeep.models.terms import Bound, slow_kernel, slow_squares
 
 PERIOD = 15  # samples
@@ -18,7 +18,7 @@ CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 def fitted(run, lead=12, chosen=CHOSEN):
     spec = HankelDMDc(8, 3 * PERIOD, 1.0, lead=lead, observables=chosen)
-    return spec.input_map({"run": run}, ["surge"], INPUTS, None)
+    return spec.input_map(Given({"run": run}, ["surge"], INPUTS), None)
 
 
 def rows(chain, run, first, stop):
@@ -52,7 +52,7 @@ def test_settings_need_what_a_delayed_observable_reads(drift):
     needs = spec.needs(DT)
     assert (needs.history, needs.lead) == (14, 6)
     assert (model.history_samples - 1, model.lead_samples) == (14, 6)
-    assert_allclose(model.signature.input_map.columns.observables[0].period, 1.5, rtol=0.2)
+    assert_allclose(model.signature.input_map.observed.observables[0].period, 1.5, rtol=0.2)
 
 
 def test_the_low_pass_filter_keeps_a_constant_and_damps_the_waves():

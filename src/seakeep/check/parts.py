@@ -328,8 +328,7 @@ def regressors(model: Model, part: Part) -> FloatArray:
     # Without look-ahead and lags, and without limits of what is above training.
     input_map = model.signature.input_map
     follows, observed = input_map.follows, input_map.observed
-    if observed:
-        observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
+    observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
     still = replace(follows, lead=0) if follows else None
     input_map = replace(input_map, lead=0, observed=observed, follows=still, reference=0)
     run = part.run.sel(time=part.time)

@@ -34,8 +34,7 @@ Only upper triangles are made; what stands below the diagonal is not meaningful.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -255,43 +254,42 @@ def lay_out(channels: Iterable[int], lags: Iterable[int]) -> tuple[Group, ...]:
     return tuple(groups)
 
 
-@dataclass(frozen=True, eq=False)
 class Delayed:
-    """A regression of delayed series: snapshot pairs of several runs, and delays of each group."""
+    """A regression of delayed series: snapshot pairs of several runs, and delays of each group.
 
-    pieces: Sequence[Piece]
-    delays: Sequence[int]
+    Parameters
+    ----------
+    states : sequence of ndarray, each (time, N)
+        States of the runs.
+    groups : sequence of (sequence of ndarray, int)
+        Series by run and delays of each group; one may have no channel, and is left out.
+    windows : sequence of TrainingWindow
+        The samples of each run that train.
 
-    @classmethod
-    def of(
-        cls,
+    Attributes
+    ----------
+    groups : tuple of Group
+        Places of the groups; the first ends with the extended state.
+    rows, columns : int
+        Number of regressors and of snapshot pairs.
+    """
+
+    def __init__(
+        self,
         states: Sequence[FloatArray],
         groups: Sequence[tuple[Sequence[FloatArray], int]],
         windows: Sequence[TrainingWindow],
-    ) -> Self:
-        """Regression of runs on groups by run, each with its delays; one may have no channel."""
+    ) -> None:
         there = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
-        pieces = [
+        self.delays = [delays for _, delays in there]
+        self.pieces = [
             Piece(x, tuple(runs[run] for runs, _ in there), window.first_column, window.columns)
             for run, (x, window) in enumerate(zip(states, windows, strict=True))
         ]
-        return cls(pieces, [delays for _, delays in there])
-
-    @cached_property
-    def groups(self) -> tuple[Group, ...]:
-        """Places of the groups; the first ends with the extended state."""
-        channels = (x.shape[1] for x in self.pieces[0].series)
-        return lay_out(channels, (delay + 1 for delay in self.delays))
-
-    @property
-    def rows(self) -> int:
-        """Regressors."""
-        return self.groups[-1].stop
-
-    @property
-    def columns(self) -> int:
-        """Snapshot pairs."""
-        return sum(piece.count for piece in self.pieces)
+        channels = (runs[0].shape[1] for runs, _ in there)
+        self.groups = lay_out(channels, (delay + 1 for delay in self.delays))
+        self.rows = self.groups[-1].stop
+        self.columns = sum(piece.count for piece in self.pieces)
 
 
 def _sum_down(gram: FloatArray, heads: FloatArray, groups: Sequence[Group]) -> None:

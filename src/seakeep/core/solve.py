@@ -150,7 +150,7 @@ def identify(
     groups.append((inputs, input_delays))
     if direct is not None:
         groups.append((direct, 0))
-    problem = Delayed.of(states, groups, windows)
+    problem = Delayed(states, groups, windows)
     effective = ridge * problem.columns if per_snapshot else ridge
     chosen = "svd" if rank is not None else method or _choose(problem, effective, all_rows)
     if chosen == "svd":

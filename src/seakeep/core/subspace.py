@@ -124,7 +124,7 @@ def identify_subspace(
     y = [np.pad(each, ((0, 1), (0, 0))) for each in outputs]
     u, d = ([np.pad(each, ((1, 0), (0, 0))) for each in series] for series in (inputs, direct))
     ends = [TrainingWindow(w.first, w.last + 1, w.first_column + f) for w in windows]
-    series = Delayed.of(y, [(y, f + s), (u, f + z - 1), (d, f - 1)], ends)
+    series = Delayed(y, [(y, f + s), (u, f + z - 1), (d, f - 1)], ends)
     gram = primal_system(series).whole
     N, Q = y[0].shape[1], u[0].shape[1]
     stops = np.cumsum([N * f, N * (s + 1), Q * f, Q * z])

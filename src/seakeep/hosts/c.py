@@ -120,7 +120,7 @@ def identifier(name: str) -> str:
 def _sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict[str, str]:
     """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
-    follows, observed = input_map.follows, input_map.columns
+    follows, observed = input_map.follows, input_map.observed
     own, before = (observed.reach(delayed=each)[0] for each in (True, False))
     back = max(follows.back if follows else 0, own - input_map.lead, before)
     kernels: list[FloatArray] = []

@@ -249,7 +249,7 @@ def _forcing(
 ) -> _Value:
     """What inputs add at each step, (steps, rows); without what the surge drives."""
     input_map = signature.input_map
-    z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.columns
+    z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.observed
     now = signature.input_history
     groups, parts = [], []
     if signature.inputs and not input_map.follows:
@@ -320,7 +320,7 @@ def _tables(
         if bank := banks.get(column):
             total = _carried(u, samples, follows, bank.taps, bank.columns)
         columns.append(total.reshape(count * place.count, 1))
-    rows = _with_delayed(signature.input_map.columns, np.concatenate(columns, axis=1))
+    rows = _with_delayed(signature.input_map.observed, np.concatenate(columns, axis=1))
     rows = signature.input_scale.deviations(rows)
     surge, last = history[:, follows.column], signature.state_samples - 1 - np.arange(past)
     before = surge[last - np.arange(z, 0, -1)[:, None]]

@@ -66,7 +66,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "recursion runs on every host, fed with the probes as they are measured; or without "
             "alignment."
         )
-    for bound in input_map.columns.bound:
+    for bound in input_map.observed.bound:
         if not bound.terms:
             raise RequestError(
                 f"the observable '{bound.labels[0].name}' states no terms, by which other "

@@ -21,7 +21,7 @@ from seakeep.models.engine import Windows, open_runs
 from seakeep.models.forecasts import Model, counted, weighed_runs
 from seakeep.models.growth import LeadErrors, lead_errors, stretches_of
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.labelled import Given, Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
@@ -32,7 +32,7 @@ from seakeep.models.settings import (
     Role,
     periods_to_samples,
 )
-from seakeep.models.training import Training, TrainingData, gather, until
+from seakeep.models.training import Training, TrainingData, gather
 from seakeep.models.validity import Coverage
 
 WINDOWS = (5.0, 15.0)
@@ -94,7 +94,7 @@ class Constant(Plain):
         """
         named = as_runs(runs)
         spec = self.resolved_in(named, [])
-        data = gather(named, states, [], stop, spec)
+        data = gather(Given.of(named, states, [], stop), spec)
         size = len(data.signature.states)
         solution = Solution(self.factor * np.eye(size), "svd", 0.0, size * bool(self.factor))
         return HankelDMDcModel.fitted(spec, data, solution, named)
@@ -151,38 +151,43 @@ class LinearSpec(Plain):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> HankelDMDcModel:
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
+        if self.is_filter and not inputs:
+            raise RequestError(
+                f"a {self.kind.upper()} model is a filter of its inputs and has none; name at "
+                "least one input."
+            )
         named = as_runs(runs)
         spec = self.resolved_in(named, inputs)
+        given = Given.of(named, states, inputs, stop)
         if self.ridge != "rollout":
-            data = gather(named, states, inputs, stop, spec)
+            data = gather(given, spec)
             solution = spec.solve(data)
             count = len(states) * (spec.state_reach + 1) + data.direct[0].shape[1]
             needed = len(states), count + data.delayed[0].shape[1] * (spec.input_delays + 1)
-            given = solution.coefficients
-            if given.shape != needed or not np.isfinite(given).all():
-                lost = np.count_nonzero(~np.isfinite(given))
+            found = solution.coefficients
+            if found.shape != needed or not np.isfinite(found).all():
+                lost = np.count_nonzero(~np.isfinite(found))
                 raise RequestError(
-                    f"solve of '{self.kind}' returned coefficients of shape {given.shape}, "
+                    f"solve of '{self.kind}' returned coefficients of shape {found.shape}, "
                     f"{lost} of them not finite; finite ones of shape {needed} are needed."
                 )
             return HankelDMDcModel.fitted(spec, data, solution, named)
-        read = named = until(named, stop)
+        read = given
         if spec.window is not None:  # what the model reads, and no more
-            input_map = spec.input_map(named, states, inputs, spec.window)
+            input_map = spec.input_map(given, spec.window)
             before = spec.centre + input_map.history(spec.input_delays)
             first = -spec.window - max(spec.state_reach, before)
-            read = {name: run.isel(time=slice(first, None)) for name, run in named.items()}
+            last = {name: run.isel(time=slice(first, None)) for name, run in given.runs.items()}
+            read = given._replace(runs=last)
         start = replace(spec, window=None, ridge=RIDGES[-1], ridge_scale="per_snapshot")
         chosen = select(
             start,
-            read,
-            states,
-            inputs,
+            *read,
             opened=self.opened,
             ridges=(*RIDGES, *LARGER),
             horizon=WINDOWS,
         )
-        model = replace(chosen.settings, window=spec.window).fit(named, states, inputs)
+        model = replace(chosen.settings, window=spec.window).fit(*given)
         return replace(model, selection=chosen.describe())
 
     def solve(self, data: TrainingData) -> Solution:
@@ -264,16 +269,6 @@ class FIR(LinearSpec):
     def recommended(cls, encounter_period: float, dt: float) -> Self:
         """Up to three encounter periods of the inputs, and λ, chosen on held-out data."""
         return cls(input_delays=periods_to_samples(3, encounter_period, dt), ridge="rollout")
-
-    def fit(
-        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
-    ) -> HankelDMDcModel:
-        """Fit the filter; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        if not inputs:
-            raise RequestError(
-                "a FIR model is a filter of its inputs and has none; name at least one input."
-            )
-        return super().fit(runs, states, inputs, stop)
 
     def solve(self, data: TrainingData) -> Solution:
         """Filters of the inputs, beside zeros for the states."""
@@ -399,7 +394,7 @@ class Subspace(Plain):
         """Identify a model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
         named = as_runs(runs)
         spec = self.resolved_in(named, inputs)
-        data = gather(named, states, inputs, stop, spec)
+        data = gather(Given.of(named, states, inputs, stop), spec)
         future = spec.state_delays + 1 if spec.future is None else spec.future
         most = future * len(data.signature.states)
         order = min(ORDER, most) if spec.order is None else spec.order

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,10 +27,10 @@ from seakeep.core.bands import (
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
 from seakeep.models.engine import Runs as FreeRuns
-from seakeep.models.engine import Windows, member_series
+from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.forecasts import reduce_members
 from seakeep.models.inputs import Signature
-from seakeep.models.training import TrainingArrays
+from seakeep.models.training import RunArrays
 from seakeep.signals import repeated_waves
 
 Band = Literal["members", "calibrated"]
@@ -65,22 +65,12 @@ class Ensemble(FreeRuns, Protocol):
     """Members of an ensemble that a calibration uses."""
 
     @property
-    def arrays(self) -> TrainingArrays:
+    def arrays(self) -> tuple[RunArrays, ...]:
         """What the members were trained on."""
 
     @property
     def read_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant that members have read, of each run, s."""
-
-    def read_windows(
-        self,
-        run: xr.Dataset,
-        starts: Sequence[float],
-        steps: int,
-        ahead: str = "refuse",
-        name: str = "the run",
-    ) -> Windows:
-        """What forecasts from several starts in one run read."""
 
     def without(self, run: str) -> Ensemble:
         """Members as they learn from the other runs."""
@@ -169,7 +159,7 @@ def calibrate(
         known = _read_run(ensemble, name, run) if folds else None
         if known is None:
             cases[name] = ensemble, run
-        elif len(ensemble.arrays.names) > 1:
+        elif len(ensemble.arrays) > 1:
             cases[name] = _without_waves_of(ensemble, known), run
         else:
             cases |= _parts(ensemble, name, run)
@@ -269,7 +259,8 @@ def held_out(
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
         starts = tuple(run["time"].values[places].astype(float).tolist())
-        windows = ensemble.read_windows(run, starts, steps, name=name)
+        asked = [(name, start) for start in starts], steps
+        (windows,) = read_groups(signature, {name: run}, [asked])
         ((series, lost),) = member_series(ensemble, [windows], executor, tell)
         values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)
@@ -280,10 +271,10 @@ def held_out(
 
 def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
     """Members as they learn from runs of other waves; from all other runs where none has others."""
-    arrays, signature, alike = ensemble.arrays, ensemble.signature, [run]
+    signature, alike = ensemble.signature, [run]
     if waves := [*filter(is_elevation, signature.inputs)]:
         at = signature.inputs.index(waves[0])
-        records = {n: x[:, at] for n, x in zip(arrays.names, arrays.delayed, strict=True)}
+        records = {each.name: each.delayed[:, at] for each in ensemble.arrays}
         groups = repeated_waves(records, signature.dt)
         alike = [name for name in records if groups[name] == groups[run]]
     with suppress(RequestError):  # no member has others
@@ -296,9 +287,9 @@ def _without_waves_of(ensemble: Ensemble, run: str) -> Ensemble:
 
 def _parts(ensemble: Ensemble, name: str, run: xr.Dataset) -> Iterator[tuple[str, Case]]:
     """Thirds of the run that trains alone, and the ensemble as it learns from the rest of it."""
-    begin, half = ensemble.arrays.begins[0], 0.5 * ensemble.signature.dt
-    edges = np.linspace(0, len(ensemble.arrays.states[0]), PARTS + 1).round().astype(int)
-    times = begin + edges * ensemble.signature.dt - half
+    (whole,), half = ensemble.arrays, 0.5 * ensemble.signature.dt
+    edges = np.linspace(0, len(whole.states), PARTS + 1).round().astype(int)
+    times = whole.begin + edges * ensemble.signature.dt - half
     times[[0, -1]] = -np.inf, np.inf  # what no member reads goes with its neighbour
     for number in range(PARTS):
         part = run.sel(time=slice(times[number], times[number + 1]))
@@ -327,7 +318,7 @@ def _counted(progress: Progress, before: int, total: int, name: str) -> Progress
 def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[int]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
     whole_number(steps, "steps")
-    time, signature = np.asarray(run["time"].values, dtype=float), ensemble.signature
+    time, signature = run["time"].values.astype(float), ensemble.signature
     slack = 1e-6 * signature.dt
     known = _read_run(ensemble, name, run)
     begin, end = (np.inf, -np.inf) if known is None else ensemble.read_spans[known]
@@ -348,16 +339,16 @@ def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
 
     A name that was made up for a run without one says nothing.
     """
-    arrays, spans, signature = ensemble.arrays, ensemble.read_spans, ensemble.signature
-    time = np.asarray(run["time"].values, dtype=float)
+    spans, signature = ensemble.read_spans, ensemble.signature
+    time = run["time"].values.astype(float)
     values = labelled.channel_matrix(run, signature.states, name)
-    for key, begin, states in zip(arrays.names, arrays.begins, arrays.states, strict=True):
-        if key in spans and time.size:
-            ahead = round((begin - time[0]) / signature.dt)  # samples before the states
-            here, there = values[max(ahead, 0) :], states[max(-ahead, 0) :]
+    for each in ensemble.arrays:
+        if each.name in spans and time.size:
+            ahead = round((each.begin - time[0]) / signature.dt)  # samples before the states
+            here, there = values[max(ahead, 0) :], each.states[max(-ahead, 0) :]
             count = min(len(here), len(there))  # as far as both reach
             if count > 0 and np.array_equal(here[:count], there[:count]):
-                return key
+                return each.name
     return name if name in spans and not labelled.is_made_up(name, run) else None
 
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from seakeep.arrays import Datasets
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.alignment import LEAD, FittedAlignment, ProbeAlignment
+from seakeep.models.labelled import Given
 from seakeep.models.observables import Powers, SlowSquares
 from seakeep.models.settings import HankelSettings
 from seakeep.models.terms import Observable
@@ -23,8 +23,6 @@ LEADS = (0.0, 0.5, 0.75, 1.0)
 """Look-aheads that are tried, encounter periods."""
 MEMORY = 8.0
 """Memory that is tried, encounter periods."""
-Given = tuple[Datasets, Sequence[str], Sequence[str]]
-"""Training runs, states and inputs."""
 Columns = tuple[ProbeAlignment | None, int | None, bool]
 """An alignment, the look-ahead in samples where it is part of that, and whether there is any."""
 Step = Callable[[Any], list[Any]]
@@ -39,7 +37,7 @@ class Candidates:
     ----------
     base : HankelSettings
         Where it starts.
-    given : (runs, states, inputs)
+    given : Given
         Training runs, and channels.
     period, step : float
         Encounter period, samples, and time step, s.
@@ -160,8 +158,8 @@ class Candidates:
         if self.base.observables or "observables" not in {*self.vary, *self.opened}:
             return self.base.observables
         ahead = int(candidate.lead) if candidate.follows_surge else None
-        (name, run), *_ = self.given[0].items()
-        waves = labelled.elevations(run, self.given[2], name)
+        (name, run), *_ = self.given.runs.items()
+        waves = labelled.elevations(run, self.given.inputs, name)
         every = default_observables(waves, self.period * self.step, self.unseen, ahead)
         if self._is_without(candidate):
             every = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in every)
@@ -244,7 +242,7 @@ def alignments_of(stated: ProbeAlignment | None, given: Given) -> list[ProbeAlig
             continue  # no depth, no positions, or no surge among the states
         assert isinstance(fitted, FittedAlignment)
         if alignment.surge == "predicted" or any(
-            any(fitted.rig(run).offsets) for run in given[0].values()
+            any(fitted.rig(run).offsets) for run in given.runs.values()
         ):
             alignments.append(alignment)
     first = None if stated is None else base

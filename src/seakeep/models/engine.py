@@ -112,9 +112,6 @@ class Windows:
     zero: FloatArray | None = None
     departures: tuple[Windows, ...] = ()
 
-    def __len__(self) -> int:
-        return len(self.histories)
-
     def departing(
         self, measured: FloatArray, zero: FloatArray | float
     ) -> tuple[Windows, FloatArray]:
@@ -559,7 +556,7 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     on_inputs = np.zeros((len(members), N, n * (z + 1)))
     on_square = np.empty((len(members), N))
     histories = np.empty((len(members), *windows.histories.shape))
-    forcing = np.empty((len(members), len(windows), windows.steps, N))
+    forcing = np.empty((len(members), len(windows.histories), windows.steps, N))
     for k, each in enumerate(members):
         of, (a, b) = each.signature, each.matrices
         u, w, lags = of.input_scale, of.direct_scale, of.input_delays + 1
@@ -698,19 +695,17 @@ def member_series(
         If the temporary folder has no room.
     """
     count = model.n_members
-    runs: list[Series] = [
-        (
-            _room((count, len(each), each.steps, len(model.signature.states))),
-            np.empty((count, len(each)), dtype=np.int64),
-        )
-        for each in groups
-    ]
+    runs: list[Series] = []
+    for each in groups:
+        windows, _, N = each.histories.shape
+        lost = np.empty((count, windows), dtype=np.int64)
+        runs.append((_room((count, windows, each.steps, N)), lost))
     # What members are centred on comes after them.
     total = count + model.is_centred
     together = 1
     if any(each.table is not None for each in groups):
         size = sum(series.nbytes for series, _ in runs) // count
-        most = TOGETHER // max(len(each) for each in groups)
+        most = TOGETHER // max(len(each.histories) for each in groups)
         together = max(1, min(most, HELD // size))
     parts = [range(total)[at : at + together] for at in range(0, total, together)]
     computed = in_order(call, partial(model.free_runs, groups), parts, executor)

@@ -15,7 +15,7 @@ and counted.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -42,7 +42,6 @@ from seakeep.models.calibration import (
 )
 from seakeep.models.engine import Dynamics, Series, Windows, linear_runs, member_series
 from seakeep.models.forecasts import (
-    Model,
     check_arrays,
     counted,
     forecast_attrs,
@@ -58,9 +57,9 @@ from seakeep.models.growth import LeadErrors, Stretch, linear_errors
 from seakeep.models.inputs import InputMap, Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
-from seakeep.models.live import Live
+from seakeep.models.live import Servable
 from seakeep.models.settings import HankelSettings, unit_of
-from seakeep.models.training import TrainingArrays, TrainingData, departing
+from seakeep.models.training import RunArrays, TrainingData, departing, member_data
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
@@ -150,7 +149,7 @@ class BandForecast(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class HankelEnsemble(Model):
+class HankelEnsemble(Servable):
     """Ensemble of models that differ in their settings or their training data.
 
     Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
@@ -164,8 +163,8 @@ class HankelEnsemble(Model):
         Priors, seed and rules that made the draws, as JSON values.
     members : tuple of Draw
         Settings of each member, and what trains it.
-    arrays : TrainingArrays
-        Training data of the members.
+    arrays : tuple of RunArrays
+        Training data of the members, by run.
     signature : Signature
         Time step, names and units, longest delays, and how inputs drive the members.
     coverage : Coverage
@@ -185,7 +184,7 @@ class HankelEnsemble(Model):
     settings: HankelSettings
     origin: Json
     members: tuple[Draw, ...]
-    arrays: TrainingArrays
+    arrays: tuple[RunArrays, ...]
     signature: Signature
     coverage: Coverage
     calibration: Calibration | None = None
@@ -223,31 +222,50 @@ class HankelEnsemble(Model):
         run), ``ridge``, the run that trains (−1 for all) and its last sample (−1 for ``stop``),
         and how many infeasible draws came before.
         """
-        return draws_dataset(self.members, self.origin)
+        drawn = np.array([draw.drawn for draw in self.members], dtype=float)
+        variables: dict[str, Any] = {
+            name: ("member", values, {"long_name": label, "units": unit_of(self.origin[name])})
+            for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
+        }
+        ridge = np.array([draw.settings.ridge for draw in self.members], dtype=float)
+        variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
+        rows = [
+            (each.window, each.state_delays, each.input_delays, draw.run, draw.last, draw.redrawn)
+            for draw in self.members
+            for each in (draw.settings,)
+        ]
+        for (name, label), column in zip(INTEGERS.items(), zip(*rows, strict=True), strict=True):
+            values = np.array([-1 if each is None else each for each in column], dtype=np.int64)
+            variables[name] = ("member", values, {"long_name": label, "units": "1"})
+        attrs = {
+            "ensemble": json.dumps(self.origin),
+            "redrawn": sum(draw.redrawn for draw in self.members),
+        }
+        return xr.Dataset(variables, coords={"member": np.arange(self.n_members)}, attrs=attrs)
 
     @cached_property
     def training_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant of the training windows in each run that trains a member, s."""
-        spans, arrays = dict[str, tuple[float, float]](), self.arrays
-        for run, (name, begin) in enumerate(zip(arrays.names, arrays.begins, strict=True)):
+        spans = dict[str, tuple[float, float]]()
+        for run, arrays in enumerate(self.arrays):
             firsts, ends = [], []
             for draw in self._taught:
                 if draw.run in (None, run):
-                    whole, window = len(arrays.states[run]), draw.settings.window
-                    ends.append(whole - 1 if draw.last is None else draw.last - arrays.offsets[run])
+                    whole, window = len(arrays.states), draw.settings.window
+                    ends.append(whole - 1 if draw.last is None else draw.last - arrays.offset)
                     firsts.append(0 if window is None else ends[-1] - window + 1)
             if ends:
-                spans[name] = begin + min(firsts) * self.dt, begin + max(ends) * self.dt
+                begin = arrays.begin
+                spans[arrays.name] = begin + min(firsts) * self.dt, begin + max(ends) * self.dt
         return spans
 
     @cached_property
     def read_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant that any member reads of each run, delay history included, s."""
-        arrays = self.arrays
         return {
-            name: (begin, begin + (len(x) - 1) * self.dt)
-            for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
-            if len(x)
+            each.name: (each.begin, each.begin + (len(each.states) - 1) * self.dt)
+            for each in self.arrays
+            if len(each.states)
         }
 
     def free_runs(
@@ -304,7 +322,8 @@ class HankelEnsemble(Model):
     def _identified(self, number: int) -> tuple[TrainingData, Solution]:
         """Training data and regression of a member."""
         draw = self._taught[number]
-        data = self.arrays.data(draw.settings, draw.run, draw.last, self.signature)
+        arrays = self.arrays if draw.run is None else [self.arrays[draw.run]]
+        data = member_data(arrays, draw.settings, draw.last, self.signature)
         return data, data.regress(draw.settings)
 
     def spectral_radii(
@@ -375,8 +394,8 @@ class HankelEnsemble(Model):
             f"  history       {self.history_samples} samples up to the start of a forecast",
             *self.signature.input_map.describe(self.dt),
             *(each.describe() for each in self.signature.readouts),
-            f"  training      {counted(len(self.arrays.names), 'run')}"
-            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays.names) > 1 else ""),
+            f"  training      {counted(len(self.arrays), 'run')}"
+            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays) > 1 else ""),
         ]
         lines += [
             f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
@@ -686,20 +705,11 @@ class HankelEnsemble(Model):
         mean, std, lower, upper = values[0]
         return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
-    def live(
-        self,
-        *,
-        like: xr.Dataset | None = None,
-        noise: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-    ) -> Live:
-        """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
-
-        The filter predicts with the mean of the members, or with what they are centred on, whose
-        errors on what they learnt from are found here; a forecast runs all of them.
-        """
-        members = self.hold()
-        return Live(members, members._means, members.errors, like=like, noise=noise, roles=roles)
+    @property
+    def _serving(self) -> tuple[Self, list[Dynamics], LeadErrors | None]:
+        """What forecasts in service, what its filter predicts with, and errors in training."""
+        held = self.hold()
+        return held, held._means, held.errors
 
     @property
     def _means(self) -> list[Dynamics]:
@@ -710,8 +720,8 @@ class HankelEnsemble(Model):
     @cached_property
     def errors(self) -> LeadErrors | None:
         """Errors of the members' mean on what they learnt from; None where that is too short."""
-        signature, arrays = self.signature, self.arrays
-        series: Any = zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
+        signature = self.signature
+        series: Any = ((each.states, each.delayed, each.direct) for each in self.arrays)
         first = signature.history_samples - 1
         if signature.input_map.reference:  # departures need no period before a start
             series = departing(series, signature.input_map)
@@ -809,7 +819,7 @@ class HankelEnsemble(Model):
         RequestError
             If no member is left, or no run of that name trains.
         """
-        names = self.arrays.names
+        names = [each.name for each in self.arrays]
         if run not in names:
             raise RequestError(f"no run '{run}' trains. Those that do: {', '.join(names)}.")
         left_out = names.index(run)
@@ -823,7 +833,7 @@ class HankelEnsemble(Model):
                 f"no member learnt from another run than '{run}', and none is left to forecast "
                 "it. Train on several runs, or calibrate on a run that does not train."
             )
-        arrays = self.arrays.without(left_out, 0, len(self.arrays.states[left_out]), self.dt)
+        arrays = self.arrays[:left_out] + self.arrays[left_out + 1 :]
         return replace(self, members=members, arrays=arrays, calibration=None, identified=())
 
     def without_part(self, begin: int, end: int) -> HankelEnsemble:
@@ -844,20 +854,16 @@ class HankelEnsemble(Model):
         RequestError
             If no member is left.
         """
-        arrays = self.arrays.without(0, begin, end, self.dt)
-        whole = self.arrays.offsets[0] + len(self.arrays.states[0])
-        pieces = [
-            (number, offset, offset + len(x))
-            for number, (offset, x) in enumerate(zip(arrays.offsets, arrays.states, strict=True))
-        ]
+        (every,) = self.arrays
+        whole, arrays = every.offset + len(every.states), every.without(begin, end, self.dt)
         members = [replace(draw, run=None) for draw in self.members if draw.settings.window is None]
         for draw in (each for each in self.members if each.settings.window is not None):
             first = draw.first(0, whole, self.signature.input_map)
             last = whole - 1 if draw.last is None else draw.last
             members += [
                 replace(draw, run=number, last=last)
-                for number, start, stop in pieces
-                if start <= first and last < stop
+                for number, each in enumerate(arrays)
+                if each.offset <= first and last < each.offset + len(each.states)
             ]
         if not members:
             raise RequestError(
@@ -865,7 +871,13 @@ class HankelEnsemble(Model):
                 "to forecast it. Train with shorter windows or on several runs, or calibrate on "
                 "a run that does not train."
             )
-        return replace(self, members=tuple(members), arrays=arrays, calibration=None, identified=())
+        return replace(
+            self,
+            members=tuple(members),
+            arrays=tuple(arrays),
+            calibration=None,
+            identified=(),
+        )
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""
@@ -1014,32 +1026,8 @@ INTEGERS = {
 }
 
 
-def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
-    """Draws over ``member``; see ``HankelEnsemble.draws``."""
-    drawn = np.array([draw.drawn for draw in members], dtype=float)
-    variables: dict[str, Any] = {
-        name: ("member", values, {"long_name": label, "units": unit_of(origin[name])})
-        for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
-    }
-    ridge = np.array([draw.settings.ridge for draw in members], dtype=float)
-    variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
-    rows = [
-        (each.window, each.state_delays, each.input_delays, draw.run, draw.last, draw.redrawn)
-        for draw in members
-        for each in (draw.settings,)
-    ]
-    for (name, label), column in zip(INTEGERS.items(), zip(*rows, strict=True), strict=True):
-        values = np.array([-1 if each is None else each for each in column], dtype=np.int64)
-        variables[name] = ("member", values, {"long_name": label, "units": "1"})
-    attrs = {
-        "ensemble": json.dumps(dict(origin)),
-        "redrawn": sum(draw.redrawn for draw in members),
-    }
-    return xr.Dataset(variables, coords={"member": np.arange(len(members))}, attrs=attrs)
-
-
 def draws_of(dataset: xr.Dataset, shared: HankelSettings) -> tuple[Draw, ...]:
-    """Rebuild draws from :func:`draws_dataset` and what all members share."""
+    """Rebuild draws from those of a file and what all members share."""
     columns = (dataset[name].values.tolist() for name in ("ridge", *INTEGERS))
     rows = zip(*columns, strict=True)
     drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)

@@ -94,7 +94,6 @@ def observables(signature: Signature) -> dict[str, Any]:
         Contents of the file; :data:`REGRESSORS` says how they make the regressors.
     """
     observed = signature.input_map.observed
-    assert observed is not None
     count, lead = len(signature.inputs), signature.lead_samples
     first = []  # weights of one output of the first filter, (sample back, input)
     for back in (lead - signature.input_map.lead, lead):
@@ -257,7 +256,7 @@ def to_mat(
         "StateName": _cell(_state_names(signature)),
         "Notes": "seakeep: x(k+1) = A x(k) + B (u(k) - InputOffset), "
         "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset; u(k) are inputs of k + Lead",
-        **(observables(signature) if signature.input_map.observed else {}),
+        **(observables(signature) if signature.input_map.observed.observables else {}),
         **more,
     }
     target = Path(path)

@@ -36,7 +36,7 @@ from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix
 from seakeep.models.settings import Needs, Role
 from seakeep.models.training import Training
-from seakeep.models.validity import outside_training
+from seakeep.models.validity import Coverage, outside_training
 from seakeep.signals.prediction import fill_future
 from seakeep.signals.time_axis import instant_text, span_text
 
@@ -52,12 +52,14 @@ that are predicted passes over to the mean: on the virtual tank its best weight 
 class Model:
     """A fitted model: here of one member, and an ensemble says what differs.
 
-    It adds a signature, settings, ``training``, ``free_runs``, ``summary`` and ``to_dataset``.
+    It adds a signature, settings, ``training``, ``coverage``, ``free_runs``, ``summary`` and
+    ``to_dataset``.
     """
 
     signature: Signature
     settings: Any
     training: Training
+    coverage: Coverage
 
     @property
     def kind(self) -> str:

@@ -181,20 +181,14 @@ def lead_errors(
     regressed = np.setdiff1d(np.arange(square.shape[1]), read_off)
     square[:1, regressed] = np.mean(residuals[:, regressed] ** 2, axis=0)
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)
-    factor = _unseen(unknowns, stretches)
-    residual = factor * residuals.T @ residuals / len(residuals)
-    return LeadErrors(residual, np.sqrt(factor * grown))
-
-
-def _unseen(unknowns: float, stretches: Sequence[Stretch]) -> float:
-    """How much larger squared errors are in data that did not train (Akaike, 1970).
-
-    The final prediction error of p coefficients found from n samples, (n + p)/(n − p) times the
-    mean square of the residuals; at most three times, where a ridge makes up for what is missing.
-    """
+    # Squared errors are larger in data that did not train: by the final prediction error of p
+    # coefficients found from n samples (Akaike, 1970), at most three times, where a ridge makes up
+    # for what is missing.
     n = sum(each.last - each.first for each in stretches)
     p = min(unknowns, 0.5 * n)
-    return (n + p) / (n - p)
+    factor = (n + p) / (n - p)
+    residual = factor * residuals.T @ residuals / len(residuals)
+    return LeadErrors(residual, np.sqrt(factor * grown))
 
 
 def _errors(
@@ -230,5 +224,5 @@ def stretches_of(data: TrainingData, signature: Signature, runs: Datasets) -> li
         if input_map.reference:  # which the run holds before a start, not the window
             skipped = round((data.begin(number) - float(runs[name]["time"][0])) / signature.dt)
             first = max(first, signature.history_samples - 1 - skipped)
-        stretches.append(Stretch(*own, first, window.last, source, data.zero(number)))
+        stretches.append(Stretch(*own, first, window.last, source, data.zeros[number]))
     return stretches

@@ -59,9 +59,9 @@ class InputMap:
         Look-ahead: the input up to `lead` samples after an instant drives the step from it; 0
         where carriers read ahead.
     observed : Observed, optional
-        Observables. Those with delays are functions of the aligned inputs. Those without are
-        functions of the inputs without look-ahead, which are the measured ones where the model
-        follows its own surge.
+        Observables; by default there are none. Those with delays are functions of the aligned
+        inputs. Those without are functions of the inputs without look-ahead, which are the measured
+        ones where the model follows its own surge.
     follows : Following, optional
         Carriers to the place where the surge that the model predicts takes the vessel.
     reference : int, optional
@@ -70,20 +70,15 @@ class InputMap:
 
     alignment: FittedAlignment | None = None
     lead: int = 0
-    observed: Observed | None = None
+    observed: Observed = NOTHING
     follows: Following | None = None
     reference: int = 0
 
     @cached_property
-    def columns(self) -> Observed:
-        """The observables, which may be none."""
-        return self.observed or NOTHING
-
-    @cached_property
     def around(self) -> Around:
         """Samples that rows read."""
-        back, ahead = self.columns.reach(delayed=True)
-        before, later = self.columns.reach(delayed=False)
+        back, ahead = self.observed.reach(delayed=True)
+        before, later = self.observed.reach(delayed=False)
         ahead += self.lead
         if self.follows is not None:
             back = max(self.follows.back, self.follows.place.taps.size - 1)
@@ -104,21 +99,21 @@ class InputMap:
         """
         assert self.follows is not None
         inputs = np.ones(len(self.follows.alignment.inputs))
-        delayed, direct = self.columns.stretch
+        delayed, direct = self.observed.stretch
         return np.append(inputs, delayed), np.append(direct, 1.0)
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]
     ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
         """Labels of the delayed and of the direct regressors made of these inputs."""
-        delayed, direct = self.columns.labels
+        delayed, direct = self.observed.labels
         return inputs + delayed, direct + (SQUARED,) * (self.follows is not None)
 
     def reads(self, span: Span) -> Span:
         """Samples of the measured inputs that rows read; direct ones count from the start on."""
         back, before, ahead, _ = self.around
         first = min(span.first - back, span.known - before)
-        if self.observed is None and self.follows is None:
+        if not self.observed.observables and self.follows is None:
             first = span.first + self.lead
         return Span(first - self.reference, span.known, span.stop + ahead)
 
@@ -181,7 +176,7 @@ class InputMap:
             lines.append(
                 f"  centre        departures from means of {self.reference} samples up to a start"
             )
-        return lines + self.columns.describe(self.lead)
+        return lines + self.observed.describe(self.lead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,8 +222,9 @@ class Drive:
             begin, end = (each + input_map.lead - self.first for each in (first, stop))
             back, _, ahead, _ = input_map.around
             low = max(begin - back, 0)
-            values = input_map.columns.with_delayed(self.values[low : end + ahead - input_map.lead])
-            return Regressors(values[begin - low : end - low], direct)
+            values = self.values[low : end + ahead - input_map.lead]
+            delayed = input_map.observed.with_delayed(values)
+            return Regressors(delayed[begin - low : end - low], direct)
         place, here = input_map.follows.place, self.places(first, stop)
         if table is None:
             table = self.table(first, stop)
@@ -238,12 +234,12 @@ class Drive:
 
     def direct(self, first: int, stop: int) -> FloatArray:
         """Columns without delays that no state drives."""
-        if self.input_map.observed is None:
+        if not self.input_map.observed.observables:
             return np.empty((stop - first, 0))
         _, before, ahead, _ = self.input_map.around
         begin = max(first - before, self.first)
         values = self.values[begin - self.first : stop + ahead - self.first]
-        return self.input_map.columns.direct(values)[first - begin : stop - begin]
+        return self.input_map.observed.direct(values)[first - begin : stop - begin]
 
     @cached_property
     def whole(self) -> tuple[int, FloatArray]:
@@ -261,7 +257,7 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        flat = self.input_map.columns.with_delayed(out.reshape(-1, out.shape[2]))
+        flat = self.input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
         return flat.reshape(stop - first, count, flat.shape[1])
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:

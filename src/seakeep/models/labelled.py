@@ -2,9 +2,10 @@
 
 import math
 import re
+import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -81,6 +82,99 @@ def as_runs(runs: Runs) -> Groups:
     for name, run in named.items():
         check_run(run, name)
     return named
+
+
+class Given(NamedTuple):
+    """Training runs, which end where training ends, and the channels of a model."""
+
+    runs: Datasets
+    states: Sequence[str]
+    inputs: Sequence[str]
+
+    @classmethod
+    def of(cls, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop) -> Self:
+        """What a user gives to train with; arguments and errors as :meth:`HankelDMDc.fit`.
+
+        Lists of channels that are strings, empty, repeated or overlapping are refused.
+        """
+        for what, names in (("states", states), ("inputs", inputs)):
+            if isinstance(names, str):
+                raise RequestError(
+                    f"{what} must be a list of channel names; received the string '{names}'. "
+                    f"Write {what}=['{names}']."
+                )
+            listed = isinstance(cast("object", names), Iterable)
+            if not listed or not all(isinstance(cast("object", name), str) for name in names):
+                raise RequestError(
+                    f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
+                    "model without input takes inputs=[]."
+                )
+            if double := {name for name in names if list(names).count(name) > 1}:
+                raise RequestError(
+                    f"{what} names {', '.join(sorted(double))} more than once. Name each channel "
+                    "once."
+                )
+        if len(states) == 0:
+            raise RequestError("states is empty: name at least one channel to forecast.")
+        if both := set(states) & set(inputs):
+            raise RequestError(
+                f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and "
+                "an input is given: choose one."
+            )
+        # Arrays of names are welcome too.
+        return cls(until(as_runs(runs), stop), list(states), list(inputs))
+
+
+def until(runs: Datasets, stop: Stop) -> Groups:
+    """Cut runs at the last instants of their training windows.
+
+    Parameters
+    ----------
+    runs : mapping of str to Dataset
+        Runs.
+    stop : float, sequence or mapping of float, optional
+        Last instants, s.
+
+    Returns
+    -------
+    dict of str to Dataset
+        The runs up to and including these instants.
+
+    Raises
+    ------
+    RequestError
+        If a stop lies outside its run.
+    DataError
+        If the times of a run are not uniform.
+    """
+    asked: Any = stop
+    names, out = list(runs), {}
+    if isinstance(asked, Mapping):
+        if unknown := [name for name in asked if name not in names]:
+            raise RequestError(
+                f"stop names the run '{unknown[0]}', which is not among the runs "
+                f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
+            )
+        stops = [asked.get(name) for name in names]
+    elif np.ndim(asked) > 0:  # a scalar array, such as an instant of a run, is one for all
+        stops = list(asked)
+        if len(stops) != len(names):
+            raise RequestError(
+                f"stop has {len(stops)} instants for {len(names)} runs; give one for all, or "
+                "one per run."
+            )
+    else:
+        stops = [asked] * len(names)
+    for (name, run), at in zip(runs.items(), stops, strict=True):
+        step = run_step(run, name)
+        out[name] = run
+        if at is not None:
+            time = run["time"].values.astype(float)
+            last = nearest_sample(time, at, name, "stop")
+            # "up to and including": a sample later than the stop by more than rounding is not.
+            last -= last > 0 and time[last] > float(at) + 1e-3 * step
+            out[name] = run.isel(time=slice(0, last + 1))
+    return out
 
 
 def is_made_up(name: str, run: xr.Dataset) -> bool:
@@ -171,7 +265,7 @@ def opened(
             f"channel {listed} of {name} states no unit; it is taken to be in the model's {units}. "
             "Set its units attribute."
         )
-    return name, np.asarray(variables["time"].values, dtype=float)
+    return name, variables["time"].values.astype(float)
 
 
 def channel_matrix(

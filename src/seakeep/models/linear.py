@@ -26,11 +26,11 @@ from seakeep.core.solve import Solution, ridge_path
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import engine, export, labelled, store
 from seakeep.models.engine import Dynamics, Windows, linear_runs, parameter_of
-from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name, weighed_runs
+from seakeep.models.forecasts import check_arrays, counted, rows_by_name, weighed_runs
 from seakeep.models.growth import LeadErrors, linear_errors, stretches_of
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
-from seakeep.models.live import Live
+from seakeep.models.live import Servable
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData, system_of
@@ -82,7 +82,7 @@ class Variation:
 
 
 @dataclass(frozen=True, eq=False)
-class HankelDMDcModel(Model):
+class HankelDMDcModel(Servable):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
 
     Parameters
@@ -111,8 +111,9 @@ class HankelDMDcModel(Model):
     signature: Signature = field(repr=False)
     coverage: Coverage = field(repr=False)
     coefficients: FloatArray = field(repr=False)
-    learnt: LeadErrors | tuple[TrainingData, Datasets] | HankelDMDcModel | None = field(
-        default=None, repr=False
+    # Hints are read by the store, which cannot look into the name of a mapping of runs.
+    learnt: LeadErrors | tuple[TrainingData, Mapping[str, xr.Dataset]] | HankelDMDcModel | None = (
+        field(default=None, repr=False)
     )
     selection: str = ""
     variation: Variation | None = field(default=None, repr=False)
@@ -160,9 +161,14 @@ class HankelDMDcModel(Model):
         data, runs = self.learnt
         if self.variation is None:
             return self._errors_in(data, runs)
-        parts = data_by_value(data, runs, self.signature.parameter)
-        each = [self.at(parameter=value)._errors_in(part, runs) for value, part in parts.items()]
-        known = [errors for errors in each if errors is not None]
+        values = [parameter_of(runs[name], self.signature.parameter, name) for name in data.names]
+        by_run = [each.name for each in fields(data) if each.name != "signature"]
+        known = []
+        for value in sorted(set(values)):
+            here = [each == value for each in values]
+            own: Any = {each: tuple(compress(getattr(data, each), here)) for each in by_run}
+            errors = self.at(parameter=value)._errors_in(replace(data, **own), runs)
+            known += [] if errors is None else [errors]
         return LeadErrors.together(known) if known else None
 
     def _errors_in(self, data: TrainingData, runs: Datasets) -> LeadErrors | None:
@@ -256,7 +262,8 @@ class HankelDMDcModel(Model):
         if self.variation is None or not all(each.parameters for each in groups):
             run = partial(linear_runs, [self.dynamics], readouts=self.signature.readouts)
             return weighed_runs(self, run, groups)
-        runs = [np.empty((1, len(each), each.steps, len(self.states))) for each in groups]
+        N = len(self.states)
+        runs = [np.empty((1, len(each.parameters), each.steps, N)) for each in groups]
         for value in sorted({value for each in groups for value in each.parameters}):
             there = [np.array(each.parameters) == value for each in groups]
             computed = self.at(parameter=value).free_runs(groups)
@@ -437,31 +444,10 @@ class HankelDMDcModel(Model):
             parts.append(((high - low) / (2 * steps[:, None])).T.reshape(-1, *values.shape))
         return parts[0], parts[1]
 
-    def live(
-        self,
-        *,
-        like: xr.Dataset | None = None,
-        noise: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-    ) -> Live:
-        """Put the model into service: samples in one at a time, estimates and forecasts out.
-
-        Parameters
-        ----------
-        like, noise, roles
-            As in :class:`seakeep.models.Live`.
-
-        Returns
-        -------
-        Live
-            Without samples yet.
-
-        Raises
-        ------
-        RequestError
-            If the model holds no errors of its training, or an argument is out of range.
-        """
-        return Live(self, [self.dynamics], self.errors, like=like, noise=noise, roles=roles)
+    @property
+    def _serving(self) -> tuple[Self, list[Dynamics], LeadErrors | None]:
+        """What forecasts in service, what its filter predicts with, and errors in training."""
+        return self, [self.dynamics], self.errors
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.
@@ -572,7 +558,7 @@ class HankelDMDcModel(Model):
 
     def _system(self, *, is_file: bool = False) -> export.System:
         export.check_linear(self.signature)
-        if not all(each.terms for each in self.signature.input_map.columns.bound):
+        if not all(each.terms for each in self.signature.input_map.observed.bound):
             is_file = False  # only Python computes them
         if not is_file and (more := self.regressors[len(self.inputs) :]):
             raise RequestError(
@@ -759,15 +745,3 @@ def regress_varying(
     signature = replace(data.signature.scaled(*scales), parameter=parameter)
     data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
-
-
-def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
-    """Training data of the runs at each value of a parameter."""
-    values = [parameter_of(runs[name], parameter, name) for name in data.names]
-    by_run = [each.name for each in fields(data) if each.name != "signature"]
-    out = {}
-    for value in sorted(set(values)):
-        here = [each == value for each in values]
-        own: Any = {each: tuple(compress(getattr(data, each), here)) for each in by_run}
-        out[value] = replace(data, **own)
-    return out

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from itertools import compress
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -45,8 +45,9 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.executor import one_blas_thread
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
-from seakeep.models.engine import Dynamics, Runs
+from seakeep.models.engine import Dynamics
 from seakeep.models.forecasts import (
+    Model,
     departure,
     label_channels,
     rows_by_name,
@@ -56,7 +57,7 @@ from seakeep.models.forecasts import (
 from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
-from seakeep.models.validity import Conditions, Coverage, Validity
+from seakeep.models.validity import Conditions, Validity
 from seakeep.signals.prediction import (
     Foreseen,
     Jumps,
@@ -93,13 +94,13 @@ RIG = ("water_depth", "celerity", "probe_offset")
 """Attributes of a run that an alignment reads."""
 
 
-class Servable(Runs, Protocol):
+class Servable(Model):
     """A model that can go into service."""
 
     @property
-    def coverage(self) -> Coverage:
-        """Waves that it was trained in."""
-        ...
+    def _serving(self) -> tuple[Model, Sequence[Dynamics], LeadErrors | None]:
+        """What forecasts in service, what its filter predicts with, and errors in training."""
+        raise NotImplementedError
 
     def live(
         self,
@@ -108,7 +109,28 @@ class Servable(Runs, Protocol):
         noise: Mapping[str, float] | None = None,
         roles: Mapping[str, str] | None = None,
     ) -> Live:
-        """Put the model into service."""
+        """Put the model into service: samples in one at a time, estimates and forecasts out.
+
+        The filter of an ensemble predicts with the mean of the members, or with what they are
+        centred on, whose errors on what they learnt from are found here; a forecast runs all of
+        them.
+
+        Parameters
+        ----------
+        like, noise, roles
+            As in :class:`seakeep.models.Live`.
+
+        Returns
+        -------
+        Live
+            Without samples yet.
+
+        Raises
+        ------
+        RequestError
+            If the model holds no errors of its training, or an argument is out of range.
+        """
+        return Live(*self._serving, like=like, noise=noise, roles=roles)
 
 
 class _Update(NamedTuple):
@@ -199,7 +221,7 @@ class Live:
 
     def __init__(
         self,
-        model: Servable,
+        model: Model,
         members: Sequence[Dynamics],
         errors: LeadErrors | None,
         *,

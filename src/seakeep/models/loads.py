@@ -125,7 +125,7 @@ def _waves(data: TrainingData, runs: Datasets, number: int, places: FloatArray) 
     assert follows is not None
     run = runs[name]
     values = labelled.channel_matrix(run, data.signature.inputs, name)
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values.astype(float)
     # The wave of a sample is that an instant after the one from which the step to it starts.
     offset = labelled.nearest_sample(time, data.begin(number), name) - 1
     count = len(data.states[number])

@@ -88,14 +88,15 @@ def read_out(
         Elevation and rate at the line of each that has one; None leaves their channels as they are.
     """
     lines = [each for each in readouts if each.load is not None]
-    channels = []
+    channels = {}
     for each in readouts:
-        if each.load is None:
-            channels.append((each.column, each.read(values, None)))
-        elif waves is not None:
+        wave = None
+        if each.load is not None:
+            if waves is None:
+                continue
             wave = waves[..., lines.index(each), :]
-            channels.append((each.column, each.read(values, wave)))
-    for column, channel in channels:
+        channels[each.column] = each.read(values, wave)
+    for column, channel in channels.items():
         values[..., column] = channel
 
 

@@ -34,13 +34,14 @@ from seakeep import metrics
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.core.embedding import PrimalSystem, spread_means, training_window
 from seakeep.core.solve import ridge_path
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, quiet
 from seakeep.executor import in_order
 from seakeep.models import labelled
-from seakeep.models.candidates import Candidates, Columns, Given, Step, alignments_of
+from seakeep.models.candidates import Candidates, Columns, Step, alignments_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.inputs import Signature
+from seakeep.models.labelled import Given
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
@@ -146,7 +147,7 @@ class Trial:
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
         near = self.means <= (1.0 + alike) * self.best
-        levels = [level for level, is_near in zip(self.levels, near, strict=True) if is_near]
+        levels: list[float] = np.array(self.levels)[near].tolist()
         return stated if stated in levels else levels[-1]
 
     def at(self, level: float) -> float:
@@ -225,21 +226,11 @@ class Problem:
         """Samples that delayed regressors look ahead too far."""
         return self.widest.lead - candidate.lead
 
-    @property
-    def reader(self) -> Signature:
-        """What windows are read for; units were compared when the runs were gathered."""
-        signature = self.data.signature
-        states, inputs = (
-            tuple(replace(label, units="") for label in labels)
-            for labels in (signature.state_labels, signature.input_labels)
-        )
-        return replace(signature, state_labels=states, input_labels=inputs)
-
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray]:
         """Which delayed and direct regressors a candidate has."""
         chain = self.data.signature.input_map
         delayed, direct = [True] * len(self.data.signature.inputs), list[bool]()
-        for observable, each in zip(self.widest.observables, chain.columns.bound, strict=True):
+        for observable, each in zip(self.widest.observables, chain.observed.bound, strict=True):
             columns = [observable in candidate.observables] * len(each.labels)
             (delayed if observable.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared
@@ -251,7 +242,11 @@ class Problem:
         """Models of some runs, one per level; coefficients of what a candidate lacks are zero."""
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
-        wide = self._widened(candidate)
+        # The longest delays, as far as the candidate's own columns are among those.
+        longest = {"input_delays": self.widest.input_delays - self.ahead(candidate)}
+        if not candidate.memory:  # whose blocks begin after the delays of the states
+            longest["state_delays"] = self.widest.state_delays
+        wide = candidate.having(**longest)
         signature, system = self._system(candidate, wide, runs)
         own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
         lags = np.tile(delayed, z + 1)
@@ -271,13 +266,6 @@ class Problem:
         coefficients[..., there] = path
         signature = replace(signature, state_delays=candidate.state_reach, input_delays=z)
         return [Dynamics(each, signature) for each in coefficients]
-
-    def _widened(self, candidate: HankelSettings) -> HankelSettings:
-        """A candidate with the longest delays, as far as its own columns are among those."""
-        longest = {"input_delays": self.widest.input_delays - self.ahead(candidate)}
-        if not candidate.memory:  # whose blocks begin after the delays of the states
-            longest["state_delays"] = self.widest.state_delays
-        return candidate.having(**longest)
 
     def _system(
         self, candidate: HankelSettings, wide: HankelSettings, runs: Sequence[int]
@@ -324,11 +312,13 @@ class Problem:
                 if starts
             ]
             states, found = data.signature.state_scale.physical(data.states[run]), []
-            for windows in read_groups(self.reader, self.runs, places):
+            with quiet():  # units were compared when the runs were gathered
+                read = read_groups(data.signature, self.runs, places)
+            for windows in read:
                 starts = new[windows.steps]
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
                 # Read-outs are learnt from departures.
-                found.append((starts, *windows.departing(measured, data.zero(run))))
+                found.append((starts, *windows.departing(measured, data.zeros[run])))
             if len(self.groups) <= FEW:
                 self.read[key] = found
         return found
@@ -409,14 +399,13 @@ def _problem(
     split into.
     """
     widest = replace(widest, ridge=1.0, standardize=True)
-    runs, states, inputs = given
-    chain = widest.input_map(runs, states, inputs, widest.window)
+    chain = widest.input_map(given, widest.window)
     before = widest.reach(chain)
     after = chain.around.after
-    pieces = dict(runs)
+    pieces = dict(given.runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
         pieces = {}
-        for name, run in runs.items():
+        for name, run in given.runs.items():
             size = run.sizes["time"]
             place = training_window(size - 1, widest.window, before, 0, widest.history)
             edges = np.linspace(place.first_column, size - after, folds + 1).astype(int)
@@ -427,7 +416,7 @@ def _problem(
     if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
     known = None if isinstance(folds, int) else chain
-    data = gather(pieces, states, inputs, None, widest, known)
+    data = gather(given._replace(runs=pieces), widest, known)
     groups = tuple(pieces if isinstance(folds, int) else folds.values())
     return Problem(pieces, groups, data, widest, horizons)
 
@@ -652,21 +641,15 @@ class Selected(Generic[Chosen]):
         return "\n".join(lines)
 
 
-def settle(
-    settings: Settings,
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    **how: Any,
-) -> Selected[Settings]:
+def settle(settings: Settings, given: Given, **how: Any) -> Selected[Settings]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
     settings : HankelSettings
         What was asked for; its ``select`` says what is chosen beside λ, and how.
-    runs, states, inputs
-        As in :func:`select`.
+    given : Given
+        Training runs and channels.
     **how
         Its ``kinds``, ``executor`` and ``progress``.
 
@@ -680,7 +663,7 @@ def settle(
     RequestError
         As :func:`select`; if λ is stated as zero and something is to be chosen.
     """
-    lacking = _lacking(settings, (runs, states, inputs))
+    lacking = _lacking(settings, given)
     without = f"not aligned to the surge: {lacking}" if lacking else ""
     stated, chosen = not isinstance(settings.ridge, str), getattr(settings, "select", None)
     if stated and chosen is None:
@@ -693,9 +676,7 @@ def settle(
     asked = chosen or Select()
     selected = select(
         settings,
-        runs,
-        states,
-        inputs,
+        *given,
         vary=["readouts"] * (settings.readouts == "auto"),
         opened=asked.opened,
         ridges=(float(settings.ridge),) if stated else None,
@@ -778,7 +759,7 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
-    given = runs, states, inputs
+    given = Given(runs, states, inputs)
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
     _check_asked(settings, vary)
@@ -905,7 +886,7 @@ def _rivalled(
     own = {"ridge"} if is_varied else {"ridge", "observables"}
     plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
     before = {*made}
-    rivals = [each.having(**plain) for each in kinds if search.given[2]]
+    rivals = [each.having(**plain) for each in kinds if search.given.inputs]
     slow = [each for each in rivals if not (is_varied or each.has_path)]
     both.judge(each for each in rivals if each not in slow)
     for rival in slow:
@@ -1006,25 +987,18 @@ def _learnt(
         held = problem.held_out(candidate, level, steps)
         return fit_readouts(readouts, problem.data, problem.runs, held)
     settings = replace(candidate, ridge=1.0, standardize=True)
-    return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
+    return fit_readouts(readouts, gather(given, settings), given.runs, ())
 
 
-def readouts_for(
-    settings: HankelSettings,
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-) -> tuple[FittedReadOut, ...]:
+def readouts_for(settings: HankelSettings, given: Given) -> tuple[FittedReadOut, ...]:
     """Fit the read-outs of settings that leave nothing else to be chosen.
 
     Parameters
     ----------
     settings : HankelSettings
         Delays, λ and input maps as stated.
-    runs : mapping of str to Dataset
-        Training runs, cut at the end of their training windows.
-    states, inputs : sequence of str
-        Channels.
+    given : Given
+        Training runs and channels.
 
     Returns
     -------
@@ -1036,7 +1010,7 @@ def readouts_for(
         If a read-out names what is no state, λ is zero where forecasts are cross-fitted, or kind
         "wave" meets no waves that are carried to the predicted surge.
     """
-    given = runs, states, inputs
+    runs, states, inputs = given
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
     if "auto" not in readouts.values():
         return _learnt(readouts, None, settings, 0.0, 0, given)

@@ -32,7 +32,8 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean, quiet, warn
 from seakeep.models import labelled, store
 from seakeep.models.alignment import BACK, Following, ProbeAlignment
 from seakeep.models.inputs import InputMap
-from seakeep.models.observables import Observed, observables_of
+from seakeep.models.labelled import Given
+from seakeep.models.observables import NOTHING, Observed, observables_of
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.models.terms import Observable
 from seakeep.toml import Length, parse_length
@@ -662,25 +663,19 @@ class HankelSettings:
             return None
         return STABLE_RADIUS if self.stable is True else float(self.stable)
 
-    def input_map(
-        self,
-        runs: Datasets,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> InputMap:
+    def input_map(self, given: Given, window: int | None) -> InputMap:
         """Fit the input map to training runs that end where training ends.
 
         Observables of a model that follows its own surge are made of waves without look-ahead.
         """
-        aligned = observed = None
+        aligned, observed = None, NOTHING
         if self.alignment is not None:
-            aligned = self.alignment.fit(runs, states, inputs, window)
+            aligned = self.alignment.fit(*given, window)
         if self.observables:
-            observed = Observed.fit(self.observables, runs, inputs, window)
+            observed = Observed.fit(self.observables, given.runs, given.inputs, window)
         if aligned is None or aligned.settings.surge != "predicted":
             return InputMap(aligned, self.lead, observed)
-        follows = Following.fit(aligned, runs, states, window, self.lead)
+        follows = Following.fit(aligned, given.runs, given.states, window, self.lead)
         return InputMap(aligned, observed=observed, follows=follows)
 
     @property
@@ -706,16 +701,13 @@ class HankelSettings:
         delayed = self.input_delays
         if encounter_period and self.follows_surge:
             delayed += round(BACK * encounter_period / dt)
-        before, after = delayed, self.lead
-        for each in self.observables:
-            back, ahead = each.reach(dt)
-            before = max(before, back + (delayed if each.delayed else 0))
-            after = max(after, ahead + (self.lead if each.delayed else 0))
+        observed = Observed(self.observables, (), dt, ())
+        maps = InputMap(lead=self.lead, observed=observed, reference=self.centre)
         return Needs(
             self.window or 1,
-            max(self.state_reach, self.centre + before),
+            max(self.state_reach, maps.history(delayed)),
             self.history == "inside",
-            after,
+            maps.around.ahead,
         )
 
     def to_json(self) -> Json:

@@ -38,7 +38,7 @@ from seakeep.models.ensemble import (
 )
 from seakeep.models.forecasts import Spec
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.labelled import Given, Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, regress_varying
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
@@ -60,7 +60,7 @@ from seakeep.models.settings import (
     periods_to_samples,
     prior_of,
 )
-from seakeep.models.training import TrainingArrays, check_names, departing, gather, moments, until
+from seakeep.models.training import RunArrays, departing, gather, moments
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
 
@@ -107,19 +107,11 @@ class Choosing(HankelSettings, Generic[Fitted]):
         """These settings with what was chosen for :meth:`central`."""
         raise NotImplementedError
 
-    def variants(
-        self, runs: Datasets, states: list[str], inputs: list[str], *settings: Self
-    ) -> list[tuple[Self, str]]:
+    def variants(self, given: Given, *settings: Self) -> list[tuple[Self, str]]:
         """Settings to fit until a model does not grow, each with words on its choice."""
         return [(each, "") for each in settings]
 
-    def _fitted(
-        self,
-        runs: Datasets,
-        states: list[str],
-        inputs: list[str],
-        readouts: tuple[FittedReadOut, ...],
-    ) -> Fitted:
+    def _fitted(self, given: Given, readouts: tuple[FittedReadOut, ...]) -> Fitted:
         """What settings that leave nothing to be chosen give of runs cut where training ends."""
         raise NotImplementedError
 
@@ -154,14 +146,11 @@ class Choosing(HankelSettings, Generic[Fitted]):
         RequestError, DataError
             As :meth:`fit`.
         """
-        named = until(as_runs(runs), stop)
-        check_names(states, inputs)
-        spec = self.resolved_in(named, inputs)
+        given = Given.of(runs, states, inputs, stop)
+        spec = self.resolved_in(given.runs, given.inputs)
         choice = settle(
-            spec.central(labelled.common_step(named)),
-            named,
-            list(states),
-            list(inputs),
+            spec.central(labelled.common_step(given.runs)),
+            given,
             kinds=(FIR(0), Subspace(0, 0, 0.1)),
             executor=executor,
             progress=progress,
@@ -213,23 +202,21 @@ class Choosing(HankelSettings, Generic[Fitted]):
             first, or a constant channel while ``standardize`` is set; if the model that was chosen
             grows.
         """
-        named = until(as_runs(runs), stop)
-        check_names(states, inputs)
-        states, inputs = list(states), list(inputs)
-        spec = self.resolved_in(named, inputs)
+        given = Given.of(runs, states, inputs, stop)
+        spec = self.resolved_in(given.runs, given.inputs)
         if not self.is_open:
             readouts: tuple[FittedReadOut, ...] = ()
             if self.readouts:
-                central = spec.central(labelled.common_step(named))
-                readouts = readouts_for(central, named, states, inputs)
-            model = spec._fitted(named, states, inputs, readouts)
+                central = spec.central(labelled.common_step(given.runs))
+                readouts = readouts_for(central, given)
+            model = spec._fitted(given, readouts)
             return replace(model, selection=STATED if self.observables else "")
         if selected is not None:
             choice = spec._adopt(selected)
         else:
-            choice = spec.settled(named, states, inputs, executor=executor, progress=progress)
-        for settings, words in self.variants(named, states, inputs, choice.settings):
-            model = settings._fitted(named, states, inputs, choice.readouts)
+            choice = spec.settled(*given, executor=executor, progress=progress)
+        for settings, words in self.variants(given, choice.settings):
+            model = settings._fitted(given, choice.readouts)
             radius = largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
             if radius < 1.0:
                 return replace(model, selection=words + choice.describe())
@@ -440,13 +427,7 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[HankelDMDc]:
         return replace(choice, settings=replace(choice.settings, select=None))
 
-    def variants(
-        self,
-        runs: Datasets,
-        states: list[str],
-        inputs: list[str],
-        *settings: HankelDMDc,
-    ) -> list[tuple[HankelDMDc, str]]:
+    def variants(self, given: Given, *settings: HankelDMDc) -> list[tuple[HankelDMDc, str]]:
         """As stated; with a parameter those that err 5 % less than the best pooled one, and that.
 
         With three values or more, all runs of an inner value are held out in turn; with two, the
@@ -454,6 +435,7 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
         """
         if not self.parameter:
             return [(each, "") for each in settings]
+        runs = given.runs
         every = [replace(each, parameter="") for each in settings]
         parts = SMALLER if isinstance(self.ridge, str) or len(settings) > 1 else (1.0,)
         varying = [
@@ -463,7 +445,7 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
         ]
         values = {name: parameter_of(run, self.parameter, name) for name, run in runs.items()}
         inner = sorted(set(values.values()))[1:-1]
-        steps = round(HORIZON * labelled.mean_period(runs, inputs))
+        steps = round(HORIZON * labelled.mean_period(runs, given.inputs))
         halves = labelled.first_halves(runs)
         folds = [
             ({n: runs[n] for n in runs if values[n] != out}, [n for n in runs if values[n] == out])
@@ -472,7 +454,7 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
         errors: dict[HankelDMDc, list[float]] = {each: [] for each in (*every, *varying)}
         with quiet():
             for (training, judged), each in itertools.product(folds, errors):
-                model = each._fitted(dict(training), states, inputs, ())
+                model = each._fitted(given._replace(runs=training), ())
                 for name in judged:
                     errors[each] += _window_scores(model, runs[name], name, steps, not inner)
         means = {each: float(np.mean(scores)) for each, scores in errors.items()}
@@ -489,14 +471,8 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
             for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
         ]
 
-    def _fitted(
-        self,
-        runs: Datasets,
-        states: list[str],
-        inputs: list[str],
-        readouts: tuple[FittedReadOut, ...],
-    ) -> HankelDMDcModel:
-        data, variation = gather(runs, states, inputs, None, self), None
+    def _fitted(self, given: Given, readouts: tuple[FittedReadOut, ...]) -> HankelDMDcModel:
+        data, runs, variation = gather(given, self), given.runs, None
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
             solution, data, variation = regress_varying(data, self, self.parameter, values)
@@ -806,17 +782,12 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             return replace(self, train_on="all")
         return replace(self, train_on="windows", window=self.window or WINDOW)
 
-    def _fitted(
-        self,
-        runs: Datasets,
-        states: list[str],
-        inputs: list[str],
-        readouts: tuple[FittedReadOut, ...],
-    ) -> HankelEnsemble:
+    def _fitted(self, given: Given, readouts: tuple[FittedReadOut, ...]) -> HankelEnsemble:
+        runs, states, inputs = given
         dt = labelled.common_step(runs)
         shared = self.shared(dt)
         labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-        input_map = shared.input_map(runs, states, inputs, None)
+        input_map = shared.input_map(given, None)
         samples = [run.sizes["time"] for run in runs.values()]
         spec = self._taught_by(runs.values(), min(samples) * dt)
         members, centre = draw_members(spec, dt, samples, input_map), spec.centred_on(dt)
@@ -825,23 +796,27 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             min(draw.first(run, count, input_map) for draw in every)
             for run, count in enumerate(samples)
         ]
-        arrays = TrainingArrays.read(runs, states, inputs, firsts, input_map)
+        arrays = [
+            RunArrays.read(given, name, first, input_map)
+            for name, first in zip(runs, firsts, strict=True)
+        ]
         trained = [
-            labelled.channel_matrix(run, inputs, name, slice(first, None))
-            for (name, run), first in zip(runs.items(), firsts, strict=True)
-            if first < run.sizes["time"]
+            labelled.channel_matrix(runs[each.name], inputs, each.name, slice(each.offset, None))
+            for each in arrays
+            if len(each.states)
         ]
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.
-        direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
-        series: Any = arrays.states, arrays.delayed, direct
+        series: Any = [
+            (each.states, each.delayed, each.direct[np.isfinite(each.direct).all(axis=1)])
+            for each in arrays
+        ]
         if shared.centre:
-            series = zip(*departing(zip(*series, strict=True), input_map), strict=True)
-        arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
+            series = departing(series, input_map)
         groups = (labels[0], *input_map.regressors(labels[1]))
         x, u, w = (
             moments(each, group, standardize=False)
-            for each, group in zip(series, groups, strict=True)
+            for each, group in zip(zip(*series, strict=True), groups, strict=True)
         )
         s = max(draw.settings.state_reach for draw in every)
         z = max(draw.settings.input_delays for draw in every)
@@ -851,7 +826,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             settings=shared,
             origin=spec.to_json(),
             members=tuple(members),
-            arrays=arrays,
+            arrays=tuple(replace(each, direct=np.nan_to_num(each.direct)) for each in arrays),
             signature=signature,
             coverage=Coverage.of(inputs, trained, dt),
             centre=centre,

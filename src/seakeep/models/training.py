@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import reprlib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from operator import getitem
-from typing import Any, NamedTuple, Self, cast
+from typing import NamedTuple, Self
 
 import numpy as np
-import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Groups, undefined
+from seakeep.arrays import FloatArray, undefined
 from seakeep.core.embedding import (
     Delayed,
     PrimalSystem,
@@ -22,10 +20,10 @@ from seakeep.core.embedding import (
     training_window,
 )
 from seakeep.core.solve import Method, Solution, identify
-from seakeep.errors import DataError, RequestError, did_you_mean, warn
+from seakeep.errors import DataError, warn
 from seakeep.models import labelled
 from seakeep.models.inputs import InputMap, Regressors, Scale, Signature
-from seakeep.models.labelled import ChannelLabel, Span, Stop
+from seakeep.models.labelled import ChannelLabel, Given, Span
 from seakeep.models.settings import HankelSettings
 
 
@@ -79,7 +77,7 @@ class TrainingData:
         First and last instant of each window, s.
     inputs : tuple of ndarray, each (time, Q)
         Measured inputs of the windows, physical units.
-    zeros : tuple of ndarray, each (N,)
+    zeros : tuple of ndarray, each (N,), or zero
         What the states of each run depart from, physical units.
     """
 
@@ -91,11 +89,7 @@ class TrainingData:
     windows: tuple[TrainingWindow, ...]
     instants: tuple[tuple[float, float], ...]
     inputs: tuple[FloatArray, ...] = ()
-    zeros: tuple[FloatArray, ...] = ()
-
-    def zero(self, run: int) -> FloatArray | float:
-        """What the states of a run depart from, physical units."""
-        return self.zeros[run] if self.zeros else 0.0
+    zeros: tuple[FloatArray | float, ...] = ()
 
     def begin(self, run: int) -> float:
         """Instant of the first sample of a run's arrays, s."""
@@ -183,27 +177,18 @@ def system_of(
     series = [(delayed, settings.input_delays), (with_means(settings, states, direct), 0)]
     if not settings.is_filter:
         series.insert(0, (states, settings.state_delays))
-    return primal_system(Delayed.of(states, series, windows))
+    return primal_system(Delayed(states, series, windows))
 
 
 def gather(
-    runs: Datasets,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    stop: Stop,
-    settings: HankelSettings,
-    input_map: InputMap | None = None,
+    given: Given, settings: HankelSettings, input_map: InputMap | None = None
 ) -> TrainingData:
     """Fit the input map, and collect the training windows of the runs.
 
     Parameters
     ----------
-    runs : mapping of str to Dataset
-        Runs, at least one.
-    states, inputs : sequence of str
-        Channels.
-    stop : float, sequence or mapping of float, optional
-        Last instants, s.
+    given : Given
+        Runs, at least one, and channels.
     settings : HankelSettings
         Input maps, delays, window and scaling.
     input_map : InputMap, optional
@@ -217,20 +202,18 @@ def gather(
     Raises
     ------
     RequestError
-        If names are unknown, repeated or missing, or a stop lies outside its run.
+        If a channel is not known.
     DataError
         If a run is too short, has gaps, another time step, other units, or a constant channel.
     """
-    check_names(states, inputs)
-    states, inputs = list(states), list(inputs)  # arrays of names are welcome too
+    runs, states, inputs = given
     dt = labelled.common_step(runs)
-    runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    input_map = input_map or settings.input_map(runs, states, inputs, settings.window)
+    input_map = input_map or settings.input_map(given, settings.window)
     reach = settings.reach(input_map)
     pieces, read = [], []
     for name, run in runs.items():
-        time = np.asarray(run.variables["time"].values, dtype=float)
+        time = run["time"].values.astype(float)
         place, shifted, cut = _place(time.size - 1, settings, input_map)
         _check_length(place, cut.stop - 1, name, settings, reach)
         begin, here = cut.start, labelled.channel_matrix(run, states, name, cut)
@@ -238,15 +221,14 @@ def gather(
         labelled.check_finite(here[needed - begin :], states, run, name, needed)
         needed = min(place.first, place.first_column - settings.input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.around.ahead)
-        regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
+        regressors = run_regressors(input_map, given, name, span, needed)
         instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *regressors), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
     data = _standardised(pieces, dt, labels, input_map, settings)
     if len(pieces) > 1:
-        own = data.signature
-        _warn_of_dead(pieces, 0, own.state_scale, own.states)
-        _warn_of_dead(pieces, 1, own.input_scale, own.regressors)
+        _warn_of_dead(pieces, 0, data.signature.state_scale, labels[0])
+        _warn_of_dead(pieces, 1, data.signature.input_scale, input_map.regressors(labels[1])[0])
     return replace(data, inputs=tuple(read))
 
 
@@ -283,7 +265,7 @@ def _standardised(
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
     names, series, windows, instants = zip(*pieces, strict=True)
-    zeros: tuple[FloatArray, ...] = ()
+    zeros: tuple[FloatArray | float, ...] = (0.0,) * len(names)
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
     # A look-ahead leaves the last row, which is no column, without regressors.
@@ -342,192 +324,100 @@ def departing(
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingArrays:
-    """What members of an ensemble are identified from, in physical units.
+class RunArrays:
+    """What members of an ensemble learn from a run, in physical units.
 
     Parameters
     ----------
-    names : tuple of str
-        Runs.
-    states, delayed, direct : tuple of ndarray, each (time, channel)
+    name : str
+        The run.
+    states, delayed, direct : ndarray, each (time, channel)
         States and both kinds of regressors, from the earliest sample that a member reads on.
         Regressors end before the run's stop by what the model looks ahead.
-    offsets : tuple of int
-        Sample of the run at which its arrays start.
-    begins : tuple of float
-        Instant of the first sample of the arrays, s.
+    offset : int
+        Sample of the run at which these arrays start.
+    begin : float
+        Instant of their first sample, s.
     """
 
-    names: tuple[str, ...]
-    states: tuple[FloatArray, ...]
-    delayed: tuple[FloatArray, ...]
-    direct: tuple[FloatArray, ...]
-    offsets: tuple[int, ...]
-    begins: tuple[float, ...]
+    name: str
+    states: FloatArray
+    delayed: FloatArray
+    direct: FloatArray
+    offset: int
+    begin: float
 
     @classmethod
-    def read(
-        cls,
-        runs: Datasets,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        firsts: Sequence[int],
-        input_map: InputMap,
-    ) -> Self:
-        """Samples of each run from the first that a member reads on."""
-        read = []
-        for (name, run), first in zip(runs.items(), firsts, strict=True):
-            time = np.asarray(run["time"].values, dtype=float)
-            end = time.size
-            x = labelled.sound_matrix(run, states, name, slice(first, None))
-            span = Span(first, end - 1, max(end - input_map.around.ahead, first))
-            u, v = run_regressors(input_map, run, states, inputs, name, span)
-            for values in (x, u, v):
-                values.flags.writeable = False
-            read.append((name, x, u, v, first, float(time[min(first, end - 1)])))
-        return cls(*zip(*read, strict=True))
+    def read(cls, given: Given, name: str, first: int, input_map: InputMap) -> Self:
+        """Samples of a run from the first that a member reads on."""
+        run = given.runs[name]
+        time = run["time"].values.astype(float)
+        end = time.size
+        x = labelled.sound_matrix(run, given.states, name, slice(first, None))
+        span = Span(first, end - 1, max(end - input_map.around.ahead, first))
+        u, v = run_regressors(input_map, given, name, span)
+        for values in (x, u, v):
+            values.flags.writeable = False
+        return cls(name, x, u, v, first, float(time[min(first, end - 1)]))
 
-    def without(self, run: int, begin: int, end: int, dt: float) -> Self:
-        """All but some samples of a run; what lies before and after these are two runs."""
-        read = [*zip(*(getattr(self, each.name) for each in fields(self)), strict=True)]
-        name, states, delayed, direct, offset, start = read[run]
-        read[run : run + 1] = [
-            (name, states[cut], delayed[cut], direct[cut], offset + at, start + at * dt)
+    def without(self, begin: int, end: int, dt: float) -> list[Self]:
+        """What lies before some samples and after them, as two runs where both hold something."""
+        parts = (
+            replace(
+                self,
+                states=self.states[cut],
+                delayed=self.delayed[cut],
+                direct=self.direct[cut],
+                offset=self.offset + at,
+                begin=self.begin + at * dt,
+            )
             for cut, at in ((slice(0, begin), 0), (slice(end, None), end))
-            if len(states[cut])
-        ]
-        return type(self)(*zip(*read, strict=True))
+        )
+        return [each for each in parts if len(each.states)]
 
-    def data(
-        self, settings: HankelSettings, run: int | None, last: int | None, signature: Signature
-    ) -> TrainingData:
-        """What :func:`gather` makes of these runs, or of one of them, with these settings.
 
-        The windows end at a sample of the run, None for the end of what is given.
-        """
-        input_map, pieces = replace(signature.input_map, reference=0), []
-        for each in range(len(self.names)) if run is None else (run,):
-            end = len(self.states[each]) - 1 if last is None else last - self.offsets[each]
-            place, shifted, cut = _place(end, settings, input_map)
-            series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]
-            begin, dt = self.begins[each], signature.dt
-            instants = begin + place.first * dt, begin + end * dt
-            pieces.append(Piece(self.names[each], series, shifted, instants))
-        labels = signature.state_labels, signature.input_labels
-        return _standardised(pieces, signature.dt, labels, input_map, settings)
+def member_data(
+    arrays: Sequence[RunArrays], settings: HankelSettings, last: int | None, signature: Signature
+) -> TrainingData:
+    """What :func:`gather` makes of these runs with the settings of a member.
+
+    The windows end at a sample of the run, None for the end of what is given.
+    """
+    input_map, pieces = replace(signature.input_map, reference=0), []
+    for each in arrays:
+        end = len(each.states) - 1 if last is None else last - each.offset
+        place, shifted, cut = _place(end, settings, input_map)
+        series = each.states[cut], each.delayed[cut], each.direct[cut]
+        instants = each.begin + place.first * signature.dt, each.begin + end * signature.dt
+        pieces.append(Piece(each.name, series, shifted, instants))
+    labels = signature.state_labels, signature.input_labels
+    return _standardised(pieces, signature.dt, labels, input_map, settings)
 
 
 def run_regressors(
-    input_map: InputMap,
-    run: xr.Dataset,
-    states: Sequence[str],
-    inputs: Sequence[str],
-    name: str,
-    span: Span,
-    needed: int | None = None,
+    input_map: InputMap, given: Given, name: str, span: Span, needed: int | None = None
 ) -> Regressors:
     """Regressors of a training run; inputs as they are may have gaps before `needed`."""
+    run, inputs = given.runs[name], given.inputs
     # A map that reaches back has no rows at the start of a run; no column reads those.
     missing = max(0, -input_map.reads(span).first)
     span = span._replace(first=span.first + missing)
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
-    as_is = input_map.alignment is None and input_map.observed is None and not input_map.lead
+    observed = bool(input_map.observed.observables)
+    as_is = input_map.alignment is None and not observed and not input_map.lead
     first = needed if as_is and needed is not None else read.first
     labelled.check_finite(values[first : read.stop], inputs, run, name, first)
     surge = None
     if (follows := input_map.follows) is not None:
-        surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
+        surge = labelled.channel_matrix(run, [given.states[follows.column]], name)[:, 0]
     rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
-def until(runs: Datasets, stop: Stop) -> Groups:
-    """Cut runs at the last instants of their training windows.
-
-    Parameters
-    ----------
-    runs : mapping of str to Dataset
-        Runs.
-    stop : float, sequence or mapping of float, optional
-        Last instants, s.
-
-    Returns
-    -------
-    dict of str to Dataset
-        The runs up to and including these instants.
-
-    Raises
-    ------
-    RequestError
-        If a stop lies outside its run.
-    DataError
-        If the times of a run are not uniform.
-    """
-    stops, out = _stops_by_run(stop, list(runs)), {}
-    for name, run in runs.items():
-        step = labelled.run_step(run, name)
-        out[name] = run
-        if (at := stops[name]) is not None:
-            time = np.asarray(run["time"].values, dtype=float)
-            last = labelled.nearest_sample(time, at, name, "stop")
-            # "up to and including": a sample later than the stop by more than rounding is not.
-            last -= last > 0 and time[last] > float(at) + 1e-3 * step
-            out[name] = run.isel(time=slice(0, last + 1))
-    return out
-
-
-def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
-    """Refuse lists of channels that are strings, empty, repeated or overlapping."""
-    for what, names in (("states", states), ("inputs", inputs)):
-        if isinstance(names, str):
-            raise RequestError(
-                f"{what} must be a list of channel names; received the string '{names}'. "
-                f"Write {what}=['{names}']."
-            )
-        listed = isinstance(cast("object", names), Iterable)
-        if not listed or not all(isinstance(cast("object", name), str) for name in names):
-            raise RequestError(
-                f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
-                "model without input takes inputs=[]."
-            )
-        double = {name for name in names if list(names).count(name) > 1}
-        if double:
-            raise RequestError(
-                f"{what} names {', '.join(sorted(double))} more than once. Name each channel once."
-            )
-    if len(states) == 0:
-        raise RequestError("states is empty: name at least one channel to forecast.")
-    both = set(states) & set(inputs)
-    if both:
-        raise RequestError(
-            f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and an "
-            "input is given: choose one."
-        )
-
-
-def _stops_by_run(stop: Any, names: list[str]) -> dict[str, Any]:
-    """Last instant of each run's window as the user gave it; None for the run's end."""
-    if isinstance(stop, Mapping):
-        unknown = [name for name in stop if name not in names]
-        if unknown:
-            raise RequestError(
-                f"stop names the run '{unknown[0]}', which is not among the runs "
-                f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
-            )
-        return {name: stop.get(name) for name in names}
-    if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = list(stop)
-        if len(values) != len(names):
-            raise RequestError(
-                f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
-                "one per run."
-            )
-        return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, stop)
-
-
-def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequence[str]) -> None:
+def _warn_of_dead(
+    pieces: Sequence[Piece], group: int, scale: Scale, labels: Sequence[ChannelLabel]
+) -> None:
     """Warn of channels that move in some runs and stand still in others."""
     for piece in pieces:
         seen = piece.series[group][piece.window.samples]
@@ -535,9 +425,9 @@ def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequ
         still = np.ptp(seen, axis=0) <= 1e-12 * np.abs(seen).max(axis=0, initial=0.0)
         for column in np.flatnonzero(still & (scale.spread > 0)).tolist():
             warn(
-                f"channel '{names[column]}' of {piece.name} is constant ({seen[0, column]:.6g}) "
-                "over its training window, and moves in other runs. If its sensor was dead, leave "
-                "this run out: the model would learn that nothing moves."
+                f"channel '{labels[column].name}' of {piece.name} is constant "
+                f"({seen[0, column]:.6g}) over its training window, and moves in other runs. If "
+                "its sensor was dead, leave this run out: the model would learn that nothing moves."
             )
 
 

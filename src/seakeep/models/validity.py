@@ -245,8 +245,7 @@ class Coverage:
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
-        band = self.first + int(self.shares.argmax(axis=1).max(initial=0)) + 0.5
-        return int(0.25 / (dt * 2.0 ** (band / PER_OCTAVE)))
+        return int(0.25 * self.periods[self.shares.argmax(axis=1).max(initial=0)] / dt)
 
     def is_trained(self, frequency: FloatArray) -> BoolArray:
         """Whether frequencies (Hz) lie in bands that were trained, or beside one.
@@ -335,7 +334,7 @@ def outside_training(
         return []
     signature: Signature = model.signature
     name = labelled.run_name(run, "the run")
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values.astype(float)
     at = labelled.nearest_sample(time, start, name)
     first = max(at - signature.input_delays, 0)
     values = labelled.channel_matrix(run, coverage.channels, name, slice(first, at + steps))

@@ -18,10 +18,9 @@ from seakeep.conventions import in_waves
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
 from seakeep.models.conditions import disagreements
-from seakeep.models.labelled import elevations, mean_period
+from seakeep.models.labelled import elevations, mean_period, until
 from seakeep.models.settings import Select
 from seakeep.models.specs import left_open
-from seakeep.models.training import until
 from seakeep.models.validity import warn_of_slow_motions
 from seakeep.signals import find_leakage
 from seakeep.study.plan import between, step_of

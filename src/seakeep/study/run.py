@@ -31,7 +31,7 @@ from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.forecasts import STATISTICS, reduce_members
-from seakeep.models.labelled import channel_matrix, nearest_sample
+from seakeep.models.labelled import Given, channel_matrix, nearest_sample
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
@@ -348,8 +348,8 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
         the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
     """
     spec = fitted.settings
-    parts, states, inputs = plan.taught(plan.training[unit.training].spans)
-    data = gather(parts, states, inputs, None, spec)
+    given = Given(*plan.taught(plan.training[unit.training].spans))
+    data = gather(given, spec)
     system = system_of((data.states, data.delayed, data.direct), data.windows, spec)
     squares = np.linalg.eigvalsh(system.gram, UPLO="U")
     rank = round(float(np.sum(squares / (squares + fitted.training.ridge))))
@@ -360,7 +360,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
         begin = process_time()
         solution = data.regress(each)
         seconds.append(process_time() - begin)
-        models[name] = HankelDMDcModel.fitted(each, data, solution, parts)
+        models[name] = HankelDMDcModel.fitted(each, data, solution, given.runs)
         radius.append(spectral_radius(models[name].dynamics))
     test, numbers = next(iter(tested_windows(plan, unit.training).items()))
     ((_, series, *_),) = _free_runs(plan, models["truncated"], {test: numbers})
