@@ -48,21 +48,28 @@ def test_files_of_the_tutorial_are_shown_and_their_draft_can_be_fitted_and_judge
     assert "mooring_bow" not in printed  # loads are left to the user
 
 
-def test_a_study(tutorial, monkeypatch):
+def test_a_study_ends_with_its_table_and_the_way_to_its_report(tutorial, monkeypatch, command):
     pytest.importorskip("matplotlib")
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
     monkeypatch.setattr("seakeep.report.page._drawn", lambda page, number: None)
     # One process: the small study is done before another has started.
     play(STUDY.replace("study.toml -o study", "study.toml -o study --workers 1", 1))
-    assert (tutorial / "study/report.html").stat().st_size > 10_000
+    report = tutorial / "study/report.html"
+    assert report.stat().st_size > 10_000
+    told, beside = command("study", "study.toml", "-o", "study", "--workers", 1)
+    assert "ANRMSE median" in told
+    assert told.rstrip().endswith("Report: study/report.html")
+    assert "Study 1/1: finished before" in beside
+    report.unlink()
+    assert command("report", "study")[0].strip() == "study/report.html"
+    assert report.exists()
     shown = STUDY.partition("```toml\n")[2].partition("```")[0]
     assert page("tutorial/study.toml").partition("\n\n")[2] == shown
 
 
 @pytest.mark.usefixtures("tutorial")
 def test_runs_in_memory():
-    section = page("howto/data.md").partition("## Runs in memory\n")[2]
-    play(section.partition("\n## ")[0])
+    play(page("howto/data.md").partition("## Runs in memory\n")[2].partition("\n## ")[0])
 
 
 def test_other_programs_whose_c_prints_what_python_does(tutorial):
