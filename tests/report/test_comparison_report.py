@@ -24,6 +24,13 @@ from seakeep.report.comparison import (
 )
 from seakeep.study import Comparison, at_full_scale, comparison_table, difference_table, in_degrees
 
+pytest.importorskip("matplotlib")
+
+
+from seakeep.report.figures.checks import coherence
+from seakeep.report.figures.errors import error_figure, nowcast_figure
+from seakeep.report.figures.histories import overlay_figure
+
 TIME = np.arange(1, 401) * 0.1
 UNITS = {"heave": "m", "pitch": "rad", "mooring_stern": "N"}
 
@@ -179,10 +186,6 @@ def assert_labels_fit(figure):
 
 
 def test_names_of_ten_runs_and_long_ones_of_channels_do_not_meet():
-    pytest.importorskip("matplotlib")
-    from seakeep.report.figures.checks import coherence
-    from seakeep.report.figures.errors import error_figure
-
     runs = [f"Run {k}, irregular_Hs0.06_Tp{k}_with_wind and current" for k in range(10)]
     found = {name: [waves_of(1.0, 0.9, run) for run in runs] for name in ("ours", "theirs")}
     figure = error_figure(difference_table(found))
@@ -211,9 +214,6 @@ def test_a_lead_time_as_long_as_the_forecast_is_a_bound(lead_time, words):
     results = {"m": made.expand_dims(run=["r"]).assign_attrs(facts)}
     (table,) = nowcast_blocks(results)
     assert table.rows[0][:2] == ("heave", words)
-    pytest.importorskip("matplotlib")
-    from seakeep.report.figures.errors import nowcast_figure
-
     assert nowcast_figure(results, "r").get_suptitle() == "r"
 
 
@@ -229,24 +229,17 @@ def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):
     assert write_forecast(forecast, path).read_text().splitlines()[0] == "time [s],heave []"
 
 
-def overlay_figure(compared):
-    pytest.importorskip("matplotlib")
-    from seakeep.report.figures.histories import overlay_figure as draw
-
-    return draw({"": compared})
-
-
 def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path):
     judged = comparison(size=5000.0)
     judged.forecast["heave"].values *= 0.5  # errors differ between channels
-    figure = overlay_figure(judged)
+    figure = overlay_figure({"": judged})
     assert "[kN]" in figure.axes[2].get_ylabel()
     assert f"ANRMSE {float(row_of(judged)['anrmse']):.3f}" in figure.get_suptitle()
     small, large = comparison(), at_full_scale(comparison(), 120.0)
-    figure = overlay_figure(large)
+    figure = overlay_figure({"": large})
     title = "r1 · full scale, λ = 120 · sea state as stated: calm · ANRMSE"
     assert figure.get_suptitle().startswith(title)
-    assert "full scale" not in overlay_figure(small).get_suptitle()
+    assert "full scale" not in overlay_figure({"": small}).get_suptitle()
     # 1 N at model scale is 120³ N, water of one density.
     values = figure.axes[2].lines[0].get_ydata()
     assert figure.axes[2].get_ylabel().endswith("[MN]")
@@ -288,7 +281,7 @@ def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit(
     angle = wave.assign_attrs(units="deg")
     inputs = judged.inputs.assign(rudder=angle, fin=angle, **many)
     inputs["eta_fwd"].attrs["long_name"] = "probe ahead of the bow"
-    figure = overlay_figure(replace(in_degrees(judged), inputs=inputs))
+    figure = overlay_figure({"": replace(in_degrees(judged), inputs=inputs)})
     _, pitch, load, waves, angles = figure.axes
     assert pitch.get_ylabel() == "Trim angle (MRU-5)\n$\\theta$ [deg]"
     lines = load.get_ylabel().replace(r"\$", "$").split("\n")
