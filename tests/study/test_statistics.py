@@ -248,18 +248,15 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
     growth, inside, changes = 0.5, 0, []
     for seed in range(100):
         rng = default_rng(seed)
-        test = crossed(rng, {"m": 1.0}).isel(channel=[0] * 9)
         windows, channels = rng.normal(0, 0.2, (10, 1)), rng.normal(0, 0.2, 9)
         grows = np.broadcast_to(growth + windows + channels, (1, 1, 10, 10, 9)).copy()
         level = np.ones(grows.shape)
         grows[:, :, 0], level[:, :, 0] = np.nan, np.nan
-        dims = ("model", "band", "training", "window", "channel")
-        test = test.assign(
-            level=(dims, level),
-            growth=(dims, grows),
-            error_over_time=((*dims[:-1], "time"), np.ones((1, 1, 10, 10, 2))),
-        ).assign_coords(band=["all"])
-        at = trend_table(test, TRAINING, rng).sel(model="m", band="all")
+        test = cells(
+            range(9), [0.1, 10.0], level=level, growth=grows, judged=np.ones((10, 10), bool),
+            error_over_time=np.ones((1, 1, 10, 10, 2)), run=["r"] * 10, start=10.0 * np.arange(10),
+        )  # fmt: skip
+        at = trend_table(test.assign_coords(band=["all"]), TRAINING, rng).sel(model="m", band="all")
         inside += at["lower"] <= growth <= at["upper"]
         changes.append(float(at["change"]))
     assert_near(np.mean(changes), growth, 0.03)  # a standard error of 0.01

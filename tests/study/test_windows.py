@@ -175,12 +175,8 @@ def test_each_test_set_draws_from_a_stream_of_its_own():
 
 
 def test_leaving_out_a_sea_state_leaves_out_all_of_its_runs():
-    runs = {
-        "a1": recorded(400, sea_state="A"),
-        "a2": recorded(400, sea_state="A"),
-        "b1": recorded(400, sea_state="B"),
-        "lone": recorded(400),
-    }
+    runs = {name: recorded(400, sea_state=name[0]) for name in ("a1", "a2", "b1")}
+    runs["lone"] = recorded(400)
     found = training(runs=runs, scheme="leave_out", leave_out="sea_state")
     assert left_out(found) == [("a1", "a2"), ("b1",), ("lone",)]
     assert [each.runs for each in found] == [
