@@ -45,7 +45,7 @@ def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign
     for delay in ("0.1 T", "1 T"):
         found = sent(chain_of(campaign, delay=delay), rows)
         time = found["time"].values
-        assert_allclose(np.diff(time), float(offline.attrs["dt"]), rtol=1e-9)
+        assert_allclose(np.diff(time), offline.attrs["dt"], rtol=1e-9)
         expected = offline.sel(time=time, method="nearest")
         assert_near(expected["time"], time, 1e-9)
         assert time[-1] <= 60.0 - campaign.seconds(delay)
