@@ -158,8 +158,7 @@ def test_times_that_jitter_are_told_by_a_word_of_their_name(drafted, header, fac
     columns = tank_columns()
     even = columns.pop("Time [s]")
     jitter = default_rng(0).uniform(-0.004, 0.004, even.size)
-    times = {"carriage": 1.5 * even, header: factor * (even + jitter)}
-    text, campaign = drafted(times | columns)
+    text, campaign = drafted({"carriage": 1.5 * even, header: factor * (even + jitter)} | columns)
     assert campaign.settings.files.time == header
     assert campaign.settings.files.sampling_rate is None
     assert "# the files have 50.0" in text
@@ -235,8 +234,7 @@ def test_files_of_several_loggers(tmp_path, drafted, pattern, runs):
     assert ('waves = "regular" # guessed' in text) is ("regular_3" in runs)
     assert ("guessed: loggers of one run" in text) is (len(runs) == 1)
     # Half of a sample: the pulses' edges lie between samples.
-    found = campaign.prepare()["a1"].attrs["clock_mru_offset"]
-    assert_near(abs(found), 0.5, 0.01)
+    assert_near(abs(campaign.prepare()["a1"].attrs["clock_mru_offset"]), 0.5, 0.01)
 
 
 def test_a_draft_of_measurements_at_sea(tmp_path, drafted):

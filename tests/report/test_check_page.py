@@ -19,6 +19,8 @@ pytest.importorskip("matplotlib")
 
 from seakeep.report.check_page import check_sections
 
+SPEC = HankelDMDc(2, 4, 0.01, delay_rows="exact")
+
 
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory):
@@ -89,7 +91,7 @@ def test_large_loads_are_shown_alike_in_figure_and_table():
     def found(size):
         run = moored_run(2)
         run["mooring_bow"].values *= size
-        model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["mooring_bow"], ["eta"])
+        model = SPEC.fit(run, ["mooring_bow"], ["eta"])
         return statistics(model, {"run": run})
 
     both = [found(size) for size in (1.0, 1e6)]
@@ -107,7 +109,7 @@ def test_large_loads_are_shown_alike_in_figure_and_table():
 def test_several_probes_without_positions_are_not_compared_with_the_vessel():
     run = moored_run(2)
     run["eta_aft"] = run["eta"].shift(time=5, fill_value=0.0)
-    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], ["eta", "eta_aft"])
+    model = SPEC.fit(run, ["heave"], ["eta", "eta_aft"])
     response = check_sections(check_model(model, {"run": run}))[1]
     assert re.search(r"Cannot be judged: .* State both in \[rig\]", " ".join(response.notices))
     assert not response.tables
@@ -117,7 +119,7 @@ def test_several_probes_without_positions_are_not_compared_with_the_vessel():
 
 def test_what_the_model_does_not_answer_and_laws_that_do_not_hold_are_told():
     run, inputs = moored_run(2), ["eta", "mooring_bow"]
-    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["heave"], inputs)
+    model = SPEC.fit(run, ["heave"], inputs)
     checked = check_model(model, {"run": run})
     assert "inputs (mooring_bow) are at their means" in " ".join(check_sections(checked)[1].words)
     found = checked.results["statistics"]

@@ -92,8 +92,7 @@ def test_a_start_with_a_plus_counts_from_the_start_of_each_run(halves):
     )
     whole = campaign(halves, EXACT, train + "".join(tests))
     model = fit_campaign(whole)
-    judged = compare(model, whole, start="+20")
-    assert [each.start for each in judged] == [120.0, 170.0]
+    assert [each.start for each in compare(model, whole, start="+20")] == [120.0, 170.0]
     parts = calibration_parts(whole, whole.prepare(names=["b", "c"]), model.dt, "+20", "+25")
     times = [part["time"].values[[0, -1]].tolist() for part in parts.values()]
     assert times == [[120.0, 125.0], [170.0, 175.0]]
