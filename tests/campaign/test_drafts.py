@@ -9,7 +9,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from said import request_error
 from scipy import io
-from small_tank import tank_columns, write_csv
+from small_tank import campaign_of, tank_columns, write_csv
 
 from seakeep import read_campaign
 from seakeep.campaign import draft_campaign
@@ -22,9 +22,8 @@ def drafted(tmp_path):
 
     def draft(given):
         files = given if isinstance(given, list) else [write_csv(tmp_path / "run.csv", given)]
-        path, text = tmp_path / "campaign.toml", draft_campaign(files, tmp_path)
-        path.write_text(text, "utf-8")
-        return text, read_campaign(path)
+        text = draft_campaign(files, tmp_path)
+        return text, campaign_of(tmp_path, text)
 
     return draft
 

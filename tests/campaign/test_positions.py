@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from said import findings, warned
 from seas import sea
-from small_tank import write_csv
+from small_tank import campaign_of, write_csv
 from tutorial_study import edit
 
 import seakeep
@@ -43,9 +43,7 @@ def campaign(tmp_path):
         write_csv(tmp_path / f"{name}.csv", {"time [s]": time, **columns})
 
     def make(stated, waves="irregular"):
-        path = tmp_path / "campaign.toml"
-        path.write_text(CAMPAIGN.format(stated=stated, waves=waves), "utf-8")
-        return seakeep.read_campaign(path)
+        return campaign_of(tmp_path, CAMPAIGN.format(stated=stated, waves=waves))
 
     return make
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pages import page
 from said import data_error, findings, request_error
 from seas import sea
-from small_tank import tank_columns, write_csv
+from small_tank import campaign_of, tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep import read_campaign
@@ -66,10 +66,8 @@ def turning():
 def prepared(folder, columns, text, time=T):
     """The run of a file, by a campaign whose last table may be that of the run."""
     write_csv(folder / "run.csv", {"time [s]": time, **columns})
-    path = folder / "campaign.toml"
     of_run = "" if "[runs.r]" in text else "[runs.r]\n"
-    path.write_text(f"{text}\n{of_run}file = 'run.csv'\n")
-    return read_campaign(path).prepare()["r"]
+    return campaign_of(folder, f"{text}\n{of_run}file = 'run.csv'\n").prepare()["r"]
 
 
 def gyroscope():
@@ -338,15 +336,15 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
     write_csv(tmp_path / "camera.csv", {
         "time [s]": seen, "heave [mm]": 50 * other + 2 * rng.standard_normal(seen.size),
     })  # fmt: skip
-    path = tmp_path / "campaign.toml"
     near = "offset = 7200\n" if offset > 7200 else ""
-    path.write_text(
+    campaign = campaign_of(
+        tmp_path,
         "[channels.draught]\n[channels.heave]\n[instruments]\nreference = 'loads'\n"
         f"[instruments.loads]\n[instruments.camera]\n{way} = ['heave', 'draught']\n{near}"
         "[preparation]\nsampling_rate = 20\n[runs.r]\nspan = [5, 185]\n[runs.r.files]\n"
-        "loads = 'loads.csv'\ncamera = 'camera.csv'\n"
+        "loads = 'loads.csv'\ncamera = 'camera.csv'\n",
     )
-    campaign = read_campaign(path)
+    path = campaign.path
     clock = campaign.clocks()["r"]["camera"]
     # Noise of 1 % of the motion on 5 700 frames; two signals that differ leave windows apart.
     assert_near(clock.offset, offset, 3e-4 if way == "shared" else 3e-3)

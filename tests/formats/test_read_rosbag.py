@@ -5,8 +5,8 @@ import pytest
 from near import assert_near
 from numpy.testing import assert_array_equal
 from said import data_error, request_error, warned
+from small_tank import campaign_of
 
-from seakeep import read_campaign
 from seakeep.campaign import read_table
 from seakeep.campaign.readers import checksum
 from seakeep.campaign.settings import FileSettings
@@ -155,8 +155,7 @@ def test_topics_of_one_bag_are_loggers_as_the_page_says(tmp_path):
     write_bag(tmp_path / "bag_one", sent)
     shown = page("howto/data.md").partition("```toml\n")[2].partition("```")[0]
     head = '[campaign]\nname = "Bag"\nencounter_period = 3.14\n\n[preparation]\ndt = 0.05\n\n'
-    (tmp_path / "campaign.toml").write_text(head + shown, "utf-8")
-    run = read_campaign(tmp_path / "campaign.toml").prepare()["one"]
+    run = campaign_of(tmp_path, head + shown).prepare()["one"]
     inside = run.isel(time=slice(20, -20))  # filters reach over the ends
     t = inside["time"].values
     # Between samples it is interpolated; the stamps of the probe are its own.

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from near import assert_near
 from records import record
-from small_tank import CAMPAIGN, tank_columns, write_csv
+from small_tank import CAMPAIGN, campaign_of, tank_columns, write_csv
 
-from seakeep import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
 from seakeep.quality.samples import SamplesKind
 
@@ -39,15 +38,13 @@ sampling_rate = 25
 @pytest.mark.data
 def test_cameras_that_differ_by_more_than_a_model_errs_are_flagged(tmp_path):
     """The camera tells a tenth less motion in all runs, and its phase wanders."""
-    path = tmp_path / "campaign.toml"
     runs = [
         f'[runs.{n}]\nfile = "${{SEAKEEP_DATA_DIR}}/ntnu_ship_section/{n}.csv"\n'
         for n in RUNS.split()
     ]
-    path.write_text(CAMERAS + "".join(runs))
     found = {
         name: {e.kind.name: e.value for e in findings_of(run) if e.channel == "heave_of_the_camera"}
-        for name, run in read_campaign(path).prepare().items()
+        for name, run in campaign_of(tmp_path, CAMERAS + "".join(runs)).prepare().items()
     }
     assert all(found.values())
     assert set(found["3102_4"]) == {"CONSTANT", "STILL"}
