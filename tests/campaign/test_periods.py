@@ -54,16 +54,14 @@ def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(chan
 
 
 @pytest.mark.parametrize("key", ["record", "span", "train", "test"])
-@pytest.mark.parametrize("use", ["read_run", "prepare"])
+@pytest.mark.parametrize("use", [lambda c: c.read_run("first"), lambda c: c.prepare(["first"])])
 def test_a_span_that_runs_backwards_in_any_run_stops_all(changed, key, use):
     """With the measured period of some 1.4 s, and with a stated one at once."""
     irregular = "train = [0, 10]", "waves = 'irregular'\ntrain = [0, 10]"
     backwards = 'role = "test"\nspan = [2, 18]', f"waves = 'regular'\n{key} = [12, '7 T']"
     campaign = changed(irregular, backwards)
-    work = {"read_run": lambda: campaign.read_run("first"),
-            "prepare": lambda: campaign.prepare(["first"])}[use]  # fmt: skip
     with request_error(rf"^runs\.second\.{key}: received \[12.0, 7 T\]"):
-        work()
+        use(campaign)
     with request_error(r"runs\.second.*with an encounter period of 1\.6 s is "
                                            r"\[12, 11\.2\]"):  # fmt: skip
         changed(STATED, irregular, backwards)
