@@ -11,8 +11,7 @@ from seakeep import read_campaign
 from seakeep.models.settings import periods_to_samples
 from seakeep.study import fit_campaign
 
-PERIOD = 1.6
-STATED = ("scale_factor = 30.0", f"encounter_period = {PERIOD}")
+STATED = ("scale_factor = 30.0", "encounter_period = 1.6")
 
 
 def test_all_lengths_of_a_campaign(edited):

@@ -18,8 +18,7 @@ from seakeep import read_campaign
 from seakeep.signals import rotation_matrix
 
 AXES, G = ("surge", "sway", "heave"), 9.81
-DT = 0.01
-T = DT * np.arange(1500)
+T = 0.01 * np.arange(1500)
 ARM = np.array([-1.2, 0.3, -0.1])  # from the centre of gravity to the bow, in the body's axes
 
 

@@ -198,20 +198,16 @@ def test_forecasts_that_diverge_are_named_and_count_as_infinite(tmp_path):
 TRAINING = xr.Dataset({"begin": ("training", np.zeros(10))})
 
 
-def crossed(rng, levels):
-    """Errors of models in 100 cells that share training sets and windows."""
+def test_differences_between_models_have_intervals_and_verdicts():
+    """From 100 cells that share training sets and windows."""
+    rng, levels = default_rng(0), {"good": 0.8, "same": 1.0, "noisy": 1.0}
     rows, columns = 0.1 * rng.standard_normal((10, 1)), 0.1 * rng.standard_normal(10)
     shared = (1.0 + rows + columns)[..., None] * [1.0, 2.0]
     errors = np.multiply.outer(np.outer(list(levels.values()), np.ones(len(MEASURES))), shared)
-    return cells(
+    test = cells(
         ["heave", "pitch"], [0.1, 10.0], levels, error=errors, judged=np.ones((10, 10), bool),
         run=["r"] * 10, start=10.0 * np.arange(10),
     )  # fmt: skip
-
-
-def test_differences_between_models_have_intervals_and_verdicts():
-    rng = default_rng(0)
-    test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
     noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
     test["error"].loc[{"model": "noisy", "measure": "nrmse"}] *= noise
 
