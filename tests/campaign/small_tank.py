@@ -5,6 +5,8 @@ from math import tau
 import numpy as np
 import pandas as pd
 
+from seakeep import read_campaign
+
 DT = 0.02
 
 
@@ -26,6 +28,13 @@ def tank_columns(seed=0, seconds=20.0):
 def write_csv(path, columns):
     pd.DataFrame(columns).to_csv(path, index=False)
     return path
+
+
+def campaign_of(folder, text):
+    """The campaign of a text, which is written into a folder."""
+    path = folder / "campaign.toml"
+    path.write_text(text, "utf-8")
+    return read_campaign(path)
 
 
 CAMPAIGN = """

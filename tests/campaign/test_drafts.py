@@ -4,11 +4,12 @@ from math import tau
 
 import numpy as np
 import pytest
+from near import assert_near
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from said import request_error
 from scipy import io
-from small_tank import tank_columns, write_csv
+from small_tank import campaign_of, tank_columns, write_csv
 
 from seakeep import read_campaign
 from seakeep.campaign import draft_campaign
@@ -21,11 +22,14 @@ def drafted(tmp_path):
 
     def draft(given):
         files = given if isinstance(given, list) else [write_csv(tmp_path / "run.csv", given)]
-        path, text = tmp_path / "campaign.toml", draft_campaign(files, tmp_path)
-        path.write_text(text, "utf-8")
-        return text, read_campaign(path)
+        text = draft_campaign(files, tmp_path)
+        return text, campaign_of(tmp_path, text)
 
     return draft
+
+
+def roles(campaign):
+    return {name: run.role for name, run in campaign.settings.runs.items()}
 
 
 def tank_file(folder, name, seed=0, size=1.0, slower=1.0):
@@ -117,7 +121,7 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path, drafted):
     files.append(write_csv(tmp_path / "still.csv", still))  # still water has no waves
     text, campaign = drafted(files)
     rate = campaign.settings.preparation.sampling_rate
-    assert rate == pytest.approx(200 / 3, rel=1e-5)  # 40 samples in 0.6 s; each fourth made 30
+    assert_allclose(rate, 200 / 3, rtol=1e-5)  # 40 samples in 0.6 s; each fourth made 30
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
 
 
@@ -169,8 +173,7 @@ def test_times_that_jitter_are_told_by_a_word_of_their_name(drafted, header, fac
     columns = tank_columns()
     even = columns.pop("Time [s]")
     jitter = default_rng(0).uniform(-0.004, 0.004, even.size)
-    times = {"carriage": 1.5 * even, header: factor * (even + jitter)}
-    text, campaign = drafted(times | columns)
+    text, campaign = drafted({"carriage": 1.5 * even, header: factor * (even + jitter)} | columns)
     assert campaign.settings.files.time == header
     assert campaign.settings.files.sampling_rate is None
     assert "# the files have 50.0" in text
@@ -246,8 +249,7 @@ def test_files_of_several_loggers(tmp_path, drafted, pattern, runs):
     assert ('waves = "regular" # guessed' in text) is ("regular_3" in runs)
     assert ("guessed: loggers of one run" in text) is (len(runs) == 1)
     # Half of a sample: the pulses' edges lie between samples.
-    found = campaign.prepare()["a1"].attrs["clock_mru_offset"]
-    assert abs(found) == pytest.approx(0.5, abs=0.01)
+    assert_near(abs(campaign.prepare()["a1"].attrs["clock_mru_offset"]), 0.5, 0.01)
 
 
 def test_a_draft_of_measurements_at_sea(tmp_path, drafted):
@@ -264,7 +266,7 @@ def test_a_draft_of_measurements_at_sea(tmp_path, drafted):
     assert signs == {"bow_airgap": 1, "heave": -1, "wind_speed": 1}
     assert text.count("# a range down to the waves? Then sign = -1") == 1
     (run,) = campaign.prepare().values()
-    assert_allclose(run["heave"], -np.cos(run["time"]), atol=1e-3)  # resampled
+    assert_near(run["heave"], -np.cos(run["time"]), 1e-3)  # resampled
 
 
 @pytest.mark.parametrize("pattern", ["{run}/{logger}.csv", "{run}_{logger}.csv"])
@@ -306,7 +308,7 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted, alike)
     text, campaign = drafted([*alike, regular(tmp_path, "b0", 1.5), still])
     runs = campaign.settings.runs
     assert [runs[n].waves for n in ("a0", "b0", "c_decay")] == ["irregular", "regular", None]
-    assert {n: run.role for n, run in runs.items()} == {
+    assert roles(campaign) == {
         "a0": "train", "a1": "train", "a2": "test", "b0": "test", "c_decay": "unused"
     }  # fmt: skip
     assert 'waves = "regular" # guessed from its spectrum' in text
@@ -318,13 +320,12 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path, drafted, alike)
 def test_one_file_of_full_scale_is_named_and_spoils_no_other(tmp_path, drafted, alike):
     """What a decay radiates is less steep than the waves, so they are not the odd ones."""
     text, campaign = drafted([*alike, tank_file(tmp_path, "full", 1, 49.0, 7.0)])
-    roles = {name: run.role for name, run in campaign.settings.runs.items()}
-    assert roles == {"a0": "train", "a1": "train", "a2": "test", "full": "unused"}
+    assert roles(campaign) == {"a0": "train", "a1": "train", "a2": "test", "full": "unused"}
     assert campaign.settings.runs["a0"].waves == "irregular"
     assert 'role = "unused" # guessed: its waves are 49 times those of the others (median)' in text
     quiet = [tank_file(tmp_path, f"decay{seed}", seed, 0.02) for seed in range(3)]
     _, campaign = drafted([alike[0], *quiet])
-    assert [run.role for run in campaign.settings.runs.values()] == ["train", *3 * ["unused"]]
+    assert [*roles(campaign).values()] == ["train", *3 * ["unused"]]
 
 
 @pytest.mark.parametrize(
@@ -398,4 +399,4 @@ def test_init_keeps_how_files_are_read(tmp_path, command):
     files = read_campaign(out).settings.files
     assert (files.skip_rows, files.delimiter, files.decimal) == (2, "\t", ",")
     run = read_campaign(out).read_run("de")
-    np.testing.assert_allclose(run["welle_1"][:3], np.sin(np.arange(3) / 9) / 100, atol=1e-6)
+    assert_near(run["welle_1"][:3], np.sin(np.arange(3) / 9) / 100, 1e-6)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from said import warned
+from small_tank import campaign_of
 
-from seakeep import read_campaign
 from seakeep.campaign import draft_campaign
 
 pytestmark = pytest.mark.data
@@ -20,9 +20,7 @@ def test_draft(tmp_path, name):
     files = sorted((Path(os.environ["SEAKEEP_DATA_DIR"]) / name).glob("*.csv"))
     if not files:
         pytest.skip(f"{name} is not in SEAKEEP_DATA_DIR")
-    path = tmp_path / "campaign.toml"
-    path.write_text(draft_campaign(files, tmp_path), "utf-8")
-    campaign = read_campaign(path)
+    campaign = campaign_of(tmp_path, draft_campaign(files, tmp_path))
     # The position of the flume's wavemaker is the one column whose header says no unit.
     bare = [n for n, each in campaign.settings.channels.items() if each.unit_assumed]
     assert bare == (["wm_position"] if name == FLUME else [])

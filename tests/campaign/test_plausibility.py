@@ -6,7 +6,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 from said import data_error, findings, warned
-from small_tank import tank_columns, write_csv
+from small_tank import campaign_of, tank_columns, write_csv
 from tutorial_study import edit
 
 from seakeep.campaign import draft_campaign, read_campaign
@@ -65,9 +65,7 @@ def loggers(tmp_path):
         kept = (time >= begin) & (time <= end)
         rest = {n: x[kept] for n, x in columns.items() if n != "WP fwd [mm]"}
         write_csv(tmp_path / "mru.csv", rest)
-        path = tmp_path / "campaign.toml"
-        path.write_text(LOGGERS.replace(SPANS, spans), "utf-8")
-        return read_campaign(path)
+        return campaign_of(tmp_path, LOGGERS.replace(SPANS, spans))
 
     return write
 
@@ -104,11 +102,11 @@ def test_a_logger_s_file_that_stands_in_two_runs(loggers, tmp_path):
 
 
 def test_clocks_of_which_nothing_is_said_are_assumed_the_same(loggers, tmp_path):
-    found = told(loggers().prepare()["first"], *CLOCKS)
+    campaign = loggers()
+    found = told(campaign.prepare()["first"], *CLOCKS)
     assert [channel for channel, _ in found] == ["mru"]
     assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
-    path = tmp_path / "campaign.toml"
-    edit(path, ("[instruments.mru]", "[instruments.mru]\noffset = 0"))
+    path = edit(campaign.path, ("[instruments.mru]", "[instruments.mru]\noffset = 0"))
     assert not told(read_campaign(path).prepare()["first"], *CLOCKS)
 
 
@@ -284,13 +282,13 @@ def test_values_that_nothing_afloat_reaches(changed, tank, stem, header, message
 def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(tank):
     columns = tank_columns(0)
     columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
-    bare, path = write_csv(tank / "bare.csv", columns), tank / "draft.toml"
-    path.write_text(draft_campaign([bare], tank), "utf-8")
+    bare = write_csv(tank / "bare.csv", columns)
+    campaign = campaign_of(tank, draft_campaign([bare], tank))
     with warned("pitch is taken as rad, .*remove unit_as"):
-        run = read_campaign(path).prepare()["bare"]
+        run = campaign.prepare()["bare"]
     assert "unit" in kinds(run)
-    edit(path, ("unit_assumed = true", ""))
-    assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
+    edit(campaign.path, ("unit_assumed = true", ""))
+    assert "unit" not in kinds(read_campaign(campaign.path).prepare()["bare"])
 
 
 def kinds(run):

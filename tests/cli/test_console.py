@@ -22,7 +22,7 @@ with tell_warnings(), progress_bar("Preparing") as progress:
 """
 
 
-@pytest.mark.parametrize("columns", [60, 80, 120])
+@pytest.mark.parametrize("columns", [60, 120])
 def test_a_bar_shows_counts_and_time_whole_and_notes_stand_on_lines_of_their_own(columns):
     terminal = {"TERM": "xterm-256color", "FORCE_COLOR": "1", "COLUMNS": str(columns)}
     work = [sys.executable, "-W", "default", "-c", WORK]

@@ -17,19 +17,6 @@ from seakeep.study import StudyResult
 pytest.importorskip("matplotlib")
 
 
-def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, command, monkeypatch):
-    # Figures of reports are looked at in tests/report/test_page.py, of such a study.
-    monkeypatch.setattr("seakeep.report.page._drawn", lambda page, number: None)
-    out = study_folder / "out"
-    told, beside = command("study", study_folder / "study.toml", "-o", out, "--workers", 1)
-    assert "ANRMSE median" in told
-    assert told.rstrip().endswith(f"Report: {out / 'report.html'}")
-    assert "Study 4/4" in beside
-    (out / "report.html").unlink()
-    assert command("report", out)[0].strip() == str(out / "report.html")
-    assert (out / "report.html").exists()
-
-
 def test_each_page_of_a_reproduction_is_named_while_its_figures_are_drawn(monkeypatch, tmp_path):
     told = []
 

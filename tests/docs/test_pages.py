@@ -10,6 +10,8 @@ from loaded import loaded
 from pages import page, play
 from places import ROOT
 
+pytest.importorskip("matplotlib")
+
 HOSTS, STUDY, TUTORIAL = map(page, ("howto/hosts.md", "study.md", "tutorial/tutorial.md"))
 
 
@@ -23,7 +25,6 @@ def tutorial(tmp_path, monkeypatch):
 
 
 def test_the_tutorial(tutorial):
-    pytest.importorskip("matplotlib")
     pytest.importorskip("control")
     play(TUTORIAL)
     assert (tutorial / "comparison/unseen.png").stat().st_size > 10_000
@@ -33,7 +34,6 @@ def test_the_tutorial(tutorial):
 def test_files_of_the_tutorial_are_shown_and_their_draft_can_be_fitted_and_judged(
     tutorial, command
 ):
-    pytest.importorskip("matplotlib")
     assert (tutorial / "run1.csv").read_text("utf-8").splitlines()[0] in TUTORIAL
     command("init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml")
     draft = (tutorial / "draft.toml").read_text("utf-8").splitlines()
@@ -48,21 +48,27 @@ def test_files_of_the_tutorial_are_shown_and_their_draft_can_be_fitted_and_judge
     assert "mooring_bow" not in printed  # loads are left to the user
 
 
-def test_a_study(tutorial, monkeypatch):
-    pytest.importorskip("matplotlib")
+def test_a_study_ends_with_its_table_and_the_way_to_its_report(tutorial, monkeypatch, command):
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
     monkeypatch.setattr("seakeep.report.page._drawn", lambda page, number: None)
     # One process: the small study is done before another has started.
     play(STUDY.replace("study.toml -o study", "study.toml -o study --workers 1", 1))
-    assert (tutorial / "study/report.html").stat().st_size > 10_000
+    report = tutorial / "study/report.html"
+    assert report.stat().st_size > 10_000
+    told, beside = command("study", "study.toml", "-o", "study", "--workers", 1)
+    assert "ANRMSE median" in told
+    assert told.rstrip().endswith("Report: study/report.html")
+    assert "Study 1/1: finished before" in beside
+    report.unlink()
+    assert command("report", "study")[0].strip() == "study/report.html"
+    assert report.exists()
     shown = STUDY.partition("```toml\n")[2].partition("```")[0]
     assert page("tutorial/study.toml").partition("\n\n")[2] == shown
 
 
 @pytest.mark.usefixtures("tutorial")
 def test_runs_in_memory():
-    section = page("howto/data.md").partition("## Runs in memory\n")[2]
-    play(section.partition("\n## ")[0])
+    play(page("howto/data.md").partition("## Runs in memory\n")[2].partition("\n## ")[0])
 
 
 def test_other_programs_whose_c_prints_what_python_does(tutorial):
@@ -80,7 +86,6 @@ def test_other_programs_whose_c_prints_what_python_does(tutorial):
 
 
 def test_a_model_in_service_and_its_example_that_plays_a_run(tutorial, capsys):
-    pytest.importorskip("matplotlib")
     play(page("howto/live.md"))
     example = loaded(ROOT / "examples/in_service/play.py")
     example.main("model.nc", "campaign.toml", "unseen", "heave", "played.png")
@@ -92,7 +97,6 @@ def test_a_model_in_service_and_its_example_that_plays_a_run(tutorial, capsys):
 
 @pytest.mark.usefixtures("empty_figures")
 def test_the_measurement_chain(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib")
     pytest.importorskip("numba")
     monkeypatch.chdir(tmp_path)
     play(page("measurement_chain.md"))

@@ -2,7 +2,7 @@
 
 import re
 
-import pytest
+from near import assert_near
 from pages import page
 from places import ROOT
 
@@ -39,7 +39,7 @@ def test_the_study_with_half_of_the_losses():
     said = TANK[TANK.index("out, slow channels err") : TANK.index("The test measures the losses")]
     quoted = [float(each) for each in re.findall(r"\d+\.\d+", said)]
     slow, waves = made[:4], [made[4], made[6], made[5], made[7]]  # "0.062 and 0.395 instead of …"
-    assert quoted == pytest.approx([float(each) for each in slow + waves], abs=0.0051)
+    assert_near(quoted, [float(each) for each in slow + waves], 0.0051)
 
 
 def test_what_alignment_brings():

@@ -68,9 +68,9 @@ def states(found):
 def test_complete_samples_are_the_steps_of_the_live_model(model, run):
     expected, follower = model.live(), Follower(model.live)
     found = play(follower, messages(model, run, jitter=0.2))
-    samples = zip(table(run, model.inputs), table(run, model.states), strict=True)
+    inputs, outputs = (table(run, names) for names in (model.inputs, model.states))
     for sample, (instant, *estimate) in enumerate(found):
-        state = expected.step(*next(samples))
+        state = expected.step(inputs[sample], outputs[sample])
         assert_array_equal(estimate, [state, np.sqrt(np.diagonal(expected.covariance))])
         assert_near(instant, CLOCK + sample * DT, 0.1 * DT)
     assert len(found) == COUNT

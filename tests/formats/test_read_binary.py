@@ -68,8 +68,7 @@ GAINS = {"gains": np.ones(7)}
 @pytest.mark.parametrize(
     ("content", "fault", "words"),
     [
-        ({**SOUND, **GAINS}, "gains", "'gains' has 7 values, and the time 200. Save channels of"),
-        ({"run": SOUND, **GAINS}, "gains", "'gains' has 7 values, and the time 200"),
+        ({"run": SOUND, **GAINS}, "gains", "'gains' has 7 values, and the time 200. Save chan"),
         ({"time": T, **UNTIMED, **GAINS}, "gains", "'gains' has 7 values, and the time 200"),
         ({"dt": 0.05, **BOTH, **GAINS}, "gains", "'gains' has 7 values, and most 200"),
         ({"dt": 0.05, **BOTH, "f": np.ones(300)}, "f", "'f' has 300 values, and most 200"),

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from near import assert_near
+from numpy.testing import assert_array_equal
 from said import data_error, request_error, warned
+from small_tank import campaign_of
 
-from seakeep import read_campaign
 from seakeep.campaign import read_table
 from seakeep.campaign.readers import checksum
 from seakeep.campaign.settings import FileSettings
@@ -77,8 +78,8 @@ def test_a_standard_message(tmp_path, plugin, what):
         path = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
     run = read_table(path)
     # Seconds from the first reception: header stamps are 3 ms earlier; a float of ns is exact here.
-    assert_allclose(run["time"], T - 0.003, atol=1e-12)
-    assert_allclose(run["receive_time"], T, atol=1e-12)
+    assert_near(run["time"], T - 0.003, 1e-12)
+    assert_near(run["receive_time"], T, 1e-12)
     assert_array_equal(run["angular_velocity.y"], RATE)
     units = {name: run[name].attrs.get("units") for name in run.data_vars}
     assert units["angular_velocity.y"] == "rad/s"
@@ -89,7 +90,7 @@ def test_a_standard_message(tmp_path, plugin, what):
 
 def test_the_times_of_reception_on_request(tmp_path):
     run = read_table(save(tmp_path, mru=imu), FileSettings(time="receive_time"))
-    assert_allclose(run["time"], T, atol=1e-12)
+    assert_near(run["time"], T, 1e-12)
     with request_error("the column 'time' cannot be a channel"):
         read_table(tmp_path / "bag", FileSettings(time="receive_time"), columns=["time"])
 
@@ -120,7 +121,7 @@ def test_headers_that_are_not_stamped(tmp_path):
     path = save(tmp_path, mru=lambda i: imu(i, stamped=False))
     with warned("the headers of the topic '/mru' are not stamped"):
         run = read_table(path)
-    assert_allclose(run["time"], T, atol=1e-12)
+    assert_near(run["time"], T, 1e-12)
     path = save(tmp_path / "some", rig=lambda i: rig(i, stamped=i > 4))
     with data_error("5 of 100 messages of the topic '/rig' have no stamp"):
         read_table(path)
@@ -154,11 +155,10 @@ def test_topics_of_one_bag_are_loggers_as_the_page_says(tmp_path):
     write_bag(tmp_path / "bag_one", sent)
     shown = page("howto/data.md").partition("```toml\n")[2].partition("```")[0]
     head = '[campaign]\nname = "Bag"\nencounter_period = 3.14\n\n[preparation]\ndt = 0.05\n\n'
-    (tmp_path / "campaign.toml").write_text(head + shown, "utf-8")
-    run = read_campaign(tmp_path / "campaign.toml").prepare()["one"]
+    run = campaign_of(tmp_path, head + shown).prepare()["one"]
     inside = run.isel(time=slice(20, -20))  # filters reach over the ends
     t = inside["time"].values
     # Between samples it is interpolated; the stamps of the probe are its own.
-    assert_allclose(inside["eta_fwd"], 0.3 * np.sin(2 * t + 1), atol=1e-3)
-    assert_allclose(inside["pitch_rate"], 0.2 * np.cos(2 * t), atol=1e-3)
-    assert_allclose(inside["pitch"], np.sin(0.1 * np.sin(2 * t)), atol=1e-4)
+    assert_near(inside["eta_fwd"], 0.3 * np.sin(2 * t + 1), 1e-3)
+    assert_near(inside["pitch_rate"], 0.2 * np.cos(2 * t), 1e-3)
+    assert_near(inside["pitch"], np.sin(0.1 * np.sin(2 * t)), 1e-4)

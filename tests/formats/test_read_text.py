@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from said import data_error, request_error, warned
 
@@ -69,7 +70,6 @@ def with_comma(text):
 def test_dialects(read, text):
     run = read(text)
     assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
-    assert run["Heave"].dims == ("time",)
     for name, expected in {
         "time": [0.0, 0.1, 0.2],
         "Heave": [1.5, -1.5, 0.5],
@@ -151,7 +151,7 @@ def test_time_in_the_unit_that_its_name_ends_on(read, name, stated):
 )
 def test_dates_count_from_the_midnight_before_the_first(read, text):
     run = read(text, time="datenum" if "datenum" in text else None)
-    assert_allclose(run["time"][:2], [86399.9, 86400.1], rtol=0, atol=3e-4)
+    assert_near(run["time"][:2], [86399.9, 86400.1], 3e-4)
     assert_array_equal(run["heave"][:2], [1.5, 1.6])
     assert run["heave"].attrs["units"] == "m"
 

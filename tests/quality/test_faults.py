@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from near import assert_near
 from numpy.random import default_rng
 from records import record
 from seas import sea
@@ -30,8 +31,7 @@ PERIOD = 1.6
 
 def waves():
     frequency = np.linspace(0.4, 0.9, 20)
-    phase = default_rng(0).uniform(0, 6.28, 20)
-    return np.cos(tau * np.outer(T, frequency) + phase).sum(axis=1)
+    return np.cos(tau * np.outer(T, frequency) + default_rng(0).uniform(0, 6.28, 20)).sum(axis=1)
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def test_a_sound_series_is_left_alone(noisy):
     noise = default_rng(0).standard_normal(100_000)
     assert not find_outliers(noise).any()
     # The share of n samples of white noise scatters by 1/√n.
-    assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
+    assert_near(noise_share(noise), 1.0, 0.01)
     for size, kinds in ((0.4, set()), (0.7, {"DRIFT"})):  # a drift of less does no harm
         assert reported(noisy + size * noisy.std() * np.linspace(0, 1, 3000)) == kinds
 
@@ -148,8 +148,7 @@ def test_saturation_recurs_at_the_end_of_the_range():
 
 def test_a_model_that_is_let_go_swings_back():
     """Most of its record is rest, beside which the first swings are further than 20 SD."""
-    swings = np.exp(-0.5 * T) * np.cos(5 * T)
-    decay = swings + 1e-4 * default_rng(0).standard_normal(T.size)
+    decay = np.exp(-0.5 * T) * np.cos(5 * T) + 1e-4 * default_rng(0).standard_normal(T.size)
     assert not find_outliers(decay).any()
     decay[300:340] += np.clip(np.arange(40) / 3, 0, 1)  # a reading that comes within three samples
     assert find_outliers(decay)[302:340].all()

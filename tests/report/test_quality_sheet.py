@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from near import assert_near
 from records import record
-from small_tank import CAMPAIGN, tank_columns, write_csv
+from small_tank import CAMPAIGN, campaign_of, tank_columns, write_csv
 
-from seakeep import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
 from seakeep.quality.samples import SamplesKind
 
@@ -38,24 +38,22 @@ sampling_rate = 25
 @pytest.mark.data
 def test_cameras_that_differ_by_more_than_a_model_errs_are_flagged(tmp_path):
     """The camera tells a tenth less motion in all runs, and its phase wanders."""
-    path = tmp_path / "campaign.toml"
     runs = [
         f'[runs.{n}]\nfile = "${{SEAKEEP_DATA_DIR}}/ntnu_ship_section/{n}.csv"\n'
         for n in RUNS.split()
     ]
-    path.write_text(CAMERAS + "".join(runs))
     found = {
         name: {e.kind.name: e.value for e in findings_of(run) if e.channel == "heave_of_the_camera"}
-        for name, run in read_campaign(path).prepare().items()
+        for name, run in campaign_of(tmp_path, CAMERAS + "".join(runs)).prepare().items()
     }
     assert all(found.values())
     assert set(found["3102_4"]) == {"CONSTANT", "STILL"}
     assert found["3061_1"] == {"LAG": pytest.approx(-0.38, abs=0.03)}  # the camera is early
     assert set(found["3142_1"]) == {"STUCK", "RESOLUTION", "AGREEMENT"}  # and not SATURATED
     # Half of the camera's pixel of 0.9 mm: each reading is a mean over several markers.
-    assert found["3142_1"]["RESOLUTION"] == pytest.approx(0.00047, abs=1e-5)
-    assert found["3031_2"]["LAG_GROWS"] == pytest.approx(0.55, abs=0.1)
-    assert found["3061_2"]["LAG_GROWS"] == pytest.approx(-0.33, abs=0.1)
+    assert_near(found["3142_1"]["RESOLUTION"], 0.00047, 1e-5)
+    assert_near(found["3031_2"]["LAG_GROWS"], 0.55, 0.1)
+    assert_near(found["3061_2"]["LAG_GROWS"], -0.33, 0.1)
 
 
 def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
@@ -84,8 +82,7 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
         period=6.0, motion=0.7, step=np.nan, lag=0.015, lag_spread=0.005, growth=0.0,
         correlation=1.0, nrmse=0.0, gain=1.0, centre=centre, lags=lags,
     )  # fmt: skip
-    figure = quality_figure(run, {"heave": found})
-    top, pitch, line, lag = figure.axes
+    top, pitch, line, lag = quality_figure(run, {"heave": found}).axes
     assert "[MN]" in line.get_ylabel()
     assert pitch.get_ylabel().endswith("[deg]")
     assert top.get_facecolor() != pitch.get_facecolor()  # it has a finding

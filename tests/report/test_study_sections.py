@@ -118,17 +118,15 @@ def test_models_that_read_the_measured_surge_are_named_where_they_are_shown(resu
 
 
 def test_the_difference_from_the_first_model_has_a_table(result):
-    over = ("test", "model", "other", "measure", "channel")
-    shape = (1, 2, 2, 2, 1)
-    change, lower, upper = (np.zeros(shape) for _ in range(3))
-    change[0, 1, 0, :, 0] = -0.2, 1.5
-    lower[0, 1, 0, :, 0], upper[0, 1, 0, :, 0] = (-0.3, np.nan), (-0.1, np.nan)
-    change[0, 0, 1] = 9.0  # the other way round
-    table = xr.Dataset(
-        {"change": (over, change), "lower": (over, lower), "upper": (over, upper)},
-        coords={"test": ["t"], "model": ["m", "fir"], "other": ["m", "fir"],
-                "measure": ["nrmse", "nammae"], "channel": ["average"]},
-    )  # fmt: skip
+    numbers = {"change": [-0.2, 1.5], "lower": [-0.3, np.nan], "upper": [-0.1, np.nan]}
+    models = ["m", "fir"]
+    table = (
+        xr.Dataset({key: ("measure", each) for key, each in numbers.items()})
+        .assign_coords(measure=["nrmse", "nammae"])
+        .expand_dims(test=["t"], model=models, other=models, channel=["average"])
+        .copy(deep=True)
+    )
+    table["change"].loc[{"model": "m"}] = 9.0  # the other way round
     found = with_group(with_models(result, m={}, fir={}), "statistics/differences", table)
     shown = difference_table(found, "t")
     assert shown.name == "differences_t"

@@ -38,17 +38,17 @@ def test_a_jump_is_far_above_third_differences_of_late_and_is_taken_where_it_sta
     assert shifted[:4] == [100, 101, 103, 104]
     assert shifted[-1] < 130
     assert jumps_of(parabola + 0.1 * (t >= 100), 0.1) == jumps_of(1e9 * t**9, np.inf) == []
-    noise = default_rng(0).standard_normal(4000)
+    noise, at = default_rng(0).standard_normal(1500), np.arange(1500) == 1000
     usual = np.sqrt(20.0)  # third differences of white noise: 1, 3, 3, 1
-    assert 1000 not in jumps_of(noise + 0.8 * JUMP * usual * (np.arange(4000) == 1000))
-    assert jumps_of(noise + 1.3 * JUMP * usual * (np.arange(4000) == 1000)) == [1000]
+    assert 1000 not in jumps_of(noise + 0.8 * JUMP * usual * at)
+    assert jumps_of(noise + 1.3 * JUMP * usual * at) == [1000]
     # Gaps lower the divided differences of noise, and not what is usual.
     gaps = noise.copy()
-    gaps[1:2000:2] = np.nan
+    gaps[1:750:2] = np.nan
     assert jumps_of(gaps) == []
     rougher = np.concatenate([noise, 30 * noise])
     assert 0 < len(jumps_of(rougher)) < 400
-    assert jumps_of(rougher)[-1] < 5500
+    assert jumps_of(rougher)[-1] < 2500
 
 
 def test_what_is_missing_is_filled_from_the_record_after_the_last_gap():
@@ -137,7 +137,7 @@ def test_departures_of_a_sea_are_the_errors_of_its_prediction():
     ratio = (record[400:] - found.expected).T / np.sqrt(np.cumsum(own**2, axis=1))
     # These seas tell the root to 2 %. Errors of 62 coefficients in 400 samples count as those of
     # one step do, to first order; without them the root is 15 % larger.
-    assert rms(ratio) == pytest.approx(1.0, rel=0.1)
+    assert_allclose(rms(ratio), 1.0, rtol=0.1)
     assert 4 < found.freedom < 400 / 62  # of the largest order
 
 
@@ -146,7 +146,7 @@ def test_the_power_of_innovations_is_that_of_a_known_process():
     found = foresee(1.0 + 2.0 * autoregressive(series, 0.8, axis=0), 30, dt=0.1,
                     positions=[np.nan], depth=3.6)  # fmt: skip
     # 6000 samples tell an SD to a hundredth.
-    assert found.departures[0, :3, 0] == pytest.approx([2.0, 1.6, 1.28], rel=0.05)
+    assert_allclose(found.departures[0, :3, 0], [2.0, 1.6, 1.28], rtol=0.05)
 
 
 def test_probes_that_do_not_see_the_same_waves_are_continued_alone(sea):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from records import rms
 from seas import sea
@@ -44,15 +45,14 @@ def test_one_celerity_is_the_paper_s_delay():
     carried = carried_to(place, carry_by_celerity, slow, celerity)
     late = TIME - place / celerity
     exact = 0.3 * np.cos(3.0 * late + 0.4) + 0.2 * np.cos(5.1 * late)
-    assert_allclose(carried[INNER], exact[INNER], atol=1e-4)
+    assert_near(carried[INNER], exact[INNER], 1e-4)
 
 
 def test_nothing_moves_at_no_distance():
     record = np.column_stack([WAVES.at(TIME) + 0.3, sea(1).at(TIME) - 2.0])
     # A transform and its inverse, at the rounding of values of some 10.
     for carry, by in ((carry_by_dispersion, DEPTH), (carry_by_celerity, 2.8)):
-        here = carry(record, DT, (0.0, 0.0), by).at(0.0)
-        assert_allclose(here.reshape(record.shape), record, atol=1e-12)
+        assert_near(carry(record, DT, (0.0, 0.0), by).at(0.0).reshape(record.shape), record, 1e-12)
 
 
 def test_a_place_outside_the_range_is_taken_to_its_end():

@@ -4,6 +4,7 @@ from math import tau
 
 import numpy as np
 import pytest
+from near import assert_near
 from numpy.random import default_rng
 from records import rms
 from said import data_error
@@ -48,7 +49,7 @@ def test_pulses_give_offset_and_drift_with_honest_errors(rate, offset, drift, no
             )
         )
     # The scatter of 20 normalised errors is 1 ± 0.16; within 3 of these.
-    assert np.all(np.abs(np.std(misses, axis=0) - 1) < 0.5)
+    assert_near(np.std(misses, axis=0), 1, 0.5)
 
 
 def waves(seed):
@@ -73,7 +74,7 @@ def test_a_shared_signal_gives_honest_errors_through_the_noise_of_both(rates, no
         assert abs(read) < worst
         misses.append((read / error, (clock.drift + 40e-6) / clock.drift_error))
     # The root mean square of 12 normalised errors is 1 ± 0.2.
-    assert np.all(np.abs(np.sqrt(np.mean(np.square(misses), axis=0)) - 1) < 0.6)
+    assert_near(np.sqrt(np.mean(np.square(misses), axis=0)), 1, 0.6)
 
 
 def test_windows_that_share_a_half_are_not_counted_twice():
@@ -85,7 +86,7 @@ def test_windows_that_share_a_half_are_not_counted_twice():
         clock = clock_from_correlation(ours + 0.3 * other, readings, *reference, 20.0, 1.0)
         misses.append((clock.drift - 20e-6) / clock.drift_error)
     # The root mean square of 25 is 1 ± 0.14.
-    assert abs(rms(misses) - 1) < 0.42
+    assert_near(rms(misses), 1, 0.42)
 
 
 @pytest.mark.parametrize(
@@ -112,13 +113,13 @@ def test_pulses_down_lost_and_doubled():
     signal[(time > 45) & (time < 55)] = 0.0  # a lost pulse
     signal[(time > 61) & (time < 61.02)] = 5.0  # a spike is no pulse
     clock = clock_from_pulses(-3 * signal + 7, time, reference, instants)
-    assert clock.offset == pytest.approx(0.2, abs=1e-3)
+    assert_near(clock.offset, 0.2, 1e-3)
     assert clock.count == 9
-    assert clock.modulus == pytest.approx(20.0, abs=0.1)
+    assert_near(clock.modulus, 20.0, 0.1)
     assert clock.describe().endswith("ppm (trigger pulses, n = 9)")
     # Which period of the train is meant can be said.
     stated = clock_from_pulses(signal, time, reference, instants, expected_offset=19.0)
-    assert stated.offset == pytest.approx(20.2, abs=3e-3)
+    assert_near(stated.offset, 20.2, 3e-3)
 
 
 def test_uneven_pulses_leave_no_doubt():
@@ -128,7 +129,7 @@ def test_uneven_pulses_leave_no_doubt():
     clock = clock_from_pulses(
         *logger(train, 100.0, 130.0, 0.001, 0, 33.0), *logger(train, 500.0, 100.0, 0.001, 1)
     )
-    assert clock.offset == pytest.approx(33.0, abs=1e-3)
+    assert_near(clock.offset, 33.0, 1e-3)
     assert clock.modulus == np.inf
 
 
@@ -136,7 +137,7 @@ def test_one_pulse_gives_an_offset_and_no_drift():
     clock = clock_from_pulses(
         *logger(pulses, 100.0, 20.0, 0.001, 0, 0.2), *logger(pulses, 500.0, 20.0, 0.001, 1)
     )
-    assert clock.offset == pytest.approx(0.2, abs=1e-3)
+    assert_near(clock.offset, 0.2, 1e-3)
     assert clock.drift == 0
     assert np.isnan(clock.drift_error)
 
@@ -152,7 +153,7 @@ def test_drifts_that_differ_are_not_pooled():
     assert one.drift == other.drift == pytest.approx(21e-6)
     assert one.drift_error == pytest.approx(2e-6 / np.sqrt(2))
     assert one.method == "trigger pulses, drift of 2 runs"
-    assert one.reading(100.0) == pytest.approx(clock(20e-6).reading(100.0), abs=1e-12)
+    assert_near(one.reading(100.0), clock(20e-6).reading(100.0), 1e-12)
     assert same == Clock()
 
 
@@ -161,7 +162,7 @@ def test_a_doubtful_drift_is_not_applied():
     offset = without_doubtful_drift(doubtful)
     assert offset.drift == 0
     assert "offset only" in offset.describe()
-    assert offset.reading(100.0) == pytest.approx(doubtful.reading(100.0), abs=1e-12)
+    assert_near(offset.reading(100.0), doubtful.reading(100.0), 1e-12)
     certain = clock(20e-6, 9e-6)
     assert without_doubtful_drift(certain) == certain
 
@@ -170,4 +171,4 @@ def test_the_correlation_at_a_lag_is_that_of_the_samples_in_common():
     a, b = default_rng(0).standard_normal((2, 40)) + 5.0
     found = _correlation(a, b, np.array([-25, 0, 25]))
     expected = [np.corrcoef(x, y)[0, 1] for x, y in ((a[25:], b[:15]), (a, b), (a[:15], b[25:]))]
-    np.testing.assert_allclose(found, expected, atol=1e-12)  # rounding of an FFT
+    assert_near(found, expected, 1e-12)  # rounding of an FFT

@@ -5,6 +5,7 @@ from math import tau
 import numpy as np
 import pytest
 import xarray as xr
+from near import assert_near
 from numpy.testing import assert_allclose, assert_array_equal
 from records import rms
 from said import data_error, request_error
@@ -195,26 +196,25 @@ def test_a_lag_one_wave_period_off_is_told():
     regular, period = found([4.0], 0.3), tau / 4.0
     assert regular.ambiguous
     apart = abs(regular.lag - regular.rival_lag) / period
-    assert apart == pytest.approx(round(apart), abs=0.04)  # two steps of 0.05 s in a period
+    assert_near(apart, round(apart), 0.04)  # two steps of 0.05 s in a period
     # A sea: components that are not multiples of one another leave one peak that fits.
     sea = found([3.1, 3.6, 4.0, 4.7, 5.3], 2.1)
     assert sea.max_lag == 10.0
-    assert sea.lag == pytest.approx(2.1, abs=1e-3)  # a fiftieth of a step: noiseless
-    assert sea.offset == pytest.approx(0.25, abs=1e-3)
+    assert_near(sea.lag, 2.1, 1e-3)  # a fiftieth of a step: noiseless
+    assert_near(sea.offset, 0.25, 1e-3)
     assert not sea.ambiguous
     assert abs(sea.rival_lag - 2.1) > 1.0
     assert sea.enclosed
     # Searched within 1 s, a peak a period off is the best there is.
     near = found([3.1, 3.6, 4.0, 4.7, 5.3], 2.1, max_lag=1.0)
-    assert near.period == pytest.approx(tau / 4.2, rel=0.05)
+    assert_allclose(near.period, tau / 4.2, rtol=0.05)
     assert not near.enclosed
     assert found([1.0], 1.0, max_lag=0.5).at_limit
 
 
 def test_a_contact_sheet_shows_bad_frames_too(disturbed, tmp_path):
     path, _, flagged = disturbed
-    sheet = contact_sheet(path, flagged)
-    picture = cv2.imdecode(np.frombuffer(sheet, np.uint8), cv2.IMREAD_COLOR)
+    picture = cv2.imdecode(np.frombuffer(contact_sheet(path, flagged), np.uint8), cv2.IMREAD_COLOR)
     assert picture.shape == (4 * 270, 3 * 480, 3)
     # Four of the twelve are the worst ones; frames spread evenly may be bad too.
     borders = [tuple(picture[270 * r + 1, 480 * c + 1]) for r in range(4) for c in range(3)]
@@ -235,9 +235,9 @@ def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, c
     table = read_table(plain[0].parent / "track.csv")
     assert table["pitch"].attrs["units"] == "deg"
     # Written with six decimals of a metre, five of a degree and six of a second.
-    assert_allclose(table["surge"], tracked["surge"], atol=1e-6)
-    assert_allclose(np.deg2rad(table["pitch"]), tracked["pitch"], atol=1e-6)
-    assert_allclose(table["time"], tracked.time, atol=1e-6)
+    assert_near(table["surge"], tracked["surge"], 1e-6)
+    assert_near(np.deg2rad(table["pitch"]), tracked["pitch"], 1e-6)
+    assert_near(table["time"], tracked.time, 1e-6)
     assert cv2.imread("sheet.png").shape[1] == 1440
 
 

@@ -13,7 +13,7 @@ from oscillators import arx_run
 from said import data_error, request_error, warned
 from scipy import signal
 from seas import sea
-from small_tank import write_csv
+from small_tank import campaign_of, write_csv
 from tutorial_study import edit
 
 import seakeep
@@ -47,11 +47,11 @@ def halves(tmp_path):
 
 def campaign(folder, model, runs=None):
     runs = runs or '[runs.all]\nfile = "run.csv"\ntrain = [0.0, 100.0]\ntest = [100.0, 200.0]\n'
-    (folder / "campaign.toml").write_text(
+    return campaign_of(
+        folder,
         '[channels.eta_fwd]\ncolumn = "eta"\n[channels.heave]\ncolumn = "z"\n'
-        f'{runs}\n[model]\nstates = ["heave"]\ninputs = ["eta_fwd"]\n{model}\n'
+        f'{runs}\n[model]\nstates = ["heave"]\ninputs = ["eta_fwd"]\n{model}\n',
     )
-    return seakeep.read_campaign(folder / "campaign.toml")
 
 
 EXACT = "state_delays = 2\ninput_delays = 2\nridge = 1e-9"
@@ -92,8 +92,7 @@ def test_a_start_with_a_plus_counts_from_the_start_of_each_run(halves):
     )
     whole = campaign(halves, EXACT, train + "".join(tests))
     model = fit_campaign(whole)
-    judged = compare(model, whole, start="+20")
-    assert [each.start for each in judged] == [120.0, 170.0]
+    assert [each.start for each in compare(model, whole, start="+20")] == [120.0, 170.0]
     parts = calibration_parts(whole, whole.prepare(names=["b", "c"]), model.dt, "+20", "+25")
     times = [part["time"].values[[0, -1]].tolist() for part in parts.values()]
     assert times == [[120.0, 125.0], [170.0, 175.0]]

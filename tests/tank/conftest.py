@@ -11,7 +11,6 @@ from seakeep.campaign import load_prepared, write_prepared
 from seakeep.tank.dynamics import assemble_rig
 from seakeep.tank.hydrodynamics import load_hydrodynamics
 from seakeep.tank.play import play_run
-from seakeep.tank.seas import Sea
 from seakeep.tank.settings import DriftSettings, default_settings
 
 of_all_tests = pytest.fixture(scope="session")
@@ -98,9 +97,3 @@ def delivered(tmp_path_factory):
 def prepared(delivered):
     """Those runs, prepared."""
     return load_prepared(delivered.campaign)
-
-
-@of_all_tests
-def calm():
-    none = np.zeros(0)
-    return Sea(none, none, none, none)

@@ -21,7 +21,7 @@ from seakeep.models.engine import Windows, open_runs
 from seakeep.models.forecasts import Model, counted, weighed_runs
 from seakeep.models.growth import LeadErrors, lead_errors, stretches_of
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Given, Runs, Stop, as_runs
+from seakeep.models.labelled import Given, Runs, Stop
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
@@ -92,12 +92,12 @@ class Constant(Plain):
 
         `inputs` are accepted and not read.
         """
-        named = as_runs(runs)
-        spec = self.resolved_in(named, [])
-        data = gather(Given.of(named, states, [], stop), spec)
+        given = Given.of(runs, states, [], stop)
+        spec = self.resolved_in(given.runs, [])
+        data = gather(given, spec)
         size = len(data.signature.states)
         solution = Solution(self.factor * np.eye(size), "svd", 0.0, size * bool(self.factor))
-        return HankelDMDcModel.fitted(spec, data, solution, named)
+        return HankelDMDcModel.fitted(spec, data, solution, given.runs)
 
 
 class Mean(Constant):
@@ -156,9 +156,8 @@ class LinearSpec(Plain):
                 f"a {self.kind.upper()} model is a filter of its inputs and has none; name at "
                 "least one input."
             )
-        named = as_runs(runs)
-        spec = self.resolved_in(named, inputs)
-        given = Given.of(named, states, inputs, stop)
+        given = Given.of(runs, states, inputs, stop)
+        spec = self.resolved_in(given.runs, given.inputs)
         if self.ridge != "rollout":
             data = gather(given, spec)
             solution = spec.solve(data)
@@ -171,7 +170,7 @@ class LinearSpec(Plain):
                     f"solve of '{self.kind}' returned coefficients of shape {found.shape}, "
                     f"{lost} of them not finite; finite ones of shape {needed} are needed."
                 )
-            return HankelDMDcModel.fitted(spec, data, solution, named)
+            return HankelDMDcModel.fitted(spec, data, solution, given.runs)
         read = given
         if spec.window is not None:  # what the model reads, and no more
             input_map = spec.input_map(given, spec.window)
@@ -392,9 +391,9 @@ class Subspace(Plain):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> SubspaceModel:
         """Identify a model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        named = as_runs(runs)
-        spec = self.resolved_in(named, inputs)
-        data = gather(Given.of(named, states, inputs, stop), spec)
+        given = Given.of(runs, states, inputs, stop)
+        spec = self.resolved_in(given.runs, given.inputs)
+        data = gather(given, spec)
         future = spec.state_delays + 1 if spec.future is None else spec.future
         most = future * len(data.signature.states)
         order = min(ORDER, most) if spec.order is None else spec.order
@@ -429,7 +428,7 @@ class Subspace(Plain):
             lambda windows, _: model._runs([windows])[0][0],
             (signature.state_delays, signature.input_delays),
             order + space.D.shape[1],
-            stretches_of(data, signature, named),
+            stretches_of(data, signature, given.runs),
         )
         return replace(model, errors=errors)
 

@@ -234,9 +234,17 @@ class HankelDMDcModel(Servable):
                 f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
                 f"{100 * (abs(values[0]) - 1):.2g} % per step in its worst mode and will diverge "
                 "if it is long. Raise ridge, train on more data, use fewer state delays, look for "
-                "transients at the ends of the training runs, or set stable = True."
+                "transients at the ends of the training runs, or set stable = True (of a model "
+                "without parameter)."
             )
         return values
+
+    @property
+    def over_range(self) -> list[HankelDMDcModel]:
+        """The model; of one that varies, those at both ends of its range and in the middle."""
+        if (varies := self.variation) is None:
+            return [self]
+        return [self.at(parameter=each) for each in (varies.low, varies.high, varies.centre)]
 
     @property
     def spectral_radius(self) -> float:
@@ -600,22 +608,22 @@ class HankelDMDcModel(Servable):
             *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}{memory}"),
             *chosen,
         ]
-        shown = self
+        over, where = self.over_range, ""
         if (varies := self.variation) is not None:
             lines.append(
                 f"  parameter     {self.signature.parameter}, trained from {varies.low:g} to "
-                f"{varies.high:g}; below, in the middle, {varies.centre:g}"
+                f"{varies.high:g}; modes in the middle, {varies.centre:g}"
             )
-            shown = self.at(parameter=varies.centre)
-        radius = shown.spectral_radius
+            where = ", the largest at both ends and the middle"
+        radius = max(each.spectral_radius for each in over)
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
-        lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
+        lines.append(f"  stability     spectral radius {radius:.6f}{where} ({verdict})")
         if clipped := self.training.clipped:
             lines.append(
                 f"    {counted(len(clipped), 'eigenvalue')} clipped to {self.settings.radius:g}; "
                 f"the largest was {clipped[0]:.6f}"
             )
-        table = shown.modes()
+        table = over[-1].modes()
         for mode in range(min(5, table.sizes["mode"])):
             at = table.isel(mode=mode)
             lines.append(

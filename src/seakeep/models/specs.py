@@ -499,10 +499,7 @@ def _window_scores(
 
 def largest_radius(model: HankelDMDcModel) -> float:
     """Spectral radius, the largest over the trained range of a parameter."""
-    varies = model.variation
-    values = () if varies is None else (varies.low, varies.centre, varies.high)
-    models = [model.at(parameter=value) for value in values] or [model]
-    return max(spectral_radius(each.dynamics) for each in models)
+    return max(spectral_radius(each.dynamics) for each in model.over_range)
 
 
 WINDOW = Uniform("60 T", "120 T")

@@ -31,6 +31,8 @@ TRAINED = 0.01
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
 FAR = 3.0
 """SDs of a training run that the mean of an input may lie beyond those of the runs."""
+STILL = 0.05
+"""Part of the trained height up to which an input is still: noise, whatever its periods."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
 
@@ -270,7 +272,8 @@ class Coverage:
         Of inputs that are not among `waves`, by their places, the mean alone is judged.
 
         The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
-        tenth, are no reason. Waves are judged from five periods on, means from two; none where a
+        tenth, are no reason, nor are periods of what is still beside the training, as a rudder
+        amidships. Waves are judged from five periods on, means from two; none where a
         model departs from the means of each run.
         """
         dt = signature.dt
@@ -283,7 +286,7 @@ class Coverage:
         unseen = np.where(self.known, 0.0, own).sum(axis=1)
         reasons = np.array(
             [
-                unseen > 0.5,
+                (unseen > 0.5) & (heights > STILL * self.heights),
                 heights > margin * self.heights,
                 steepnesses > margin * self.steepnesses,
                 (means < self.lows) | (means > self.highs),
