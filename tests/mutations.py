@@ -516,7 +516,8 @@ CHANGES = {
     "models/validity.py": [
         ("period = 2.0 * seconds / crossings", "period = seconds / crossings", "models/test_slow.py::test_the_period_of_a_slow_drift_is_found"),
         ("1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])", "np.sqrt(self.edges[:-1] * self.edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
-        ("unseen > 0.5,", "unseen > 2.0,", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
+        ("unseen > 0.5)", "unseen > 2.0)", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
+        ("heights > STILL * self.heights", "heights > 0", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
         ("heights > margin * self.heights", "heights > 9 * margin * self.heights", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("steepnesses > margin * self", "steepnesses < margin * self", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),
         ("len(inputs) <= 8 * self.quarter(dt)", "False", "models/test_contracts.py::test_higher_waves_and_a_drift_are_outside"),

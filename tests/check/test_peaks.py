@@ -114,10 +114,11 @@ def test_waves_outside_the_training_are_named(model, train):
         "alike": sea_run(seed=1),
         "steep": sea_run(height=0.08, seed=5),
         "short": sea_run(period=1.0, seed=2, encounter_period=1.0),
+        "calm": sea_run(period=1.0, height=0.0015, seed=2, encounter_period=1.0),
     }
     found = check.validity(model, runs)
     told = dict(zip(found.run.values, found.outside.values, strict=True))
-    assert told["train"] == told["alike"] == ""
+    assert told["train"] == told["alike"] == told["calm"] == ""
     assert "a height of 0.08" in told["steep"]
     assert "outside the periods that trained the model" in told["short"]
     assert "steepness" in told["short"]

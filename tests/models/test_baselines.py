@@ -70,6 +70,14 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     assert_near(table(forecast, STATES), table(test, STATES)[201:501], 1e-7)
 
 
+@pytest.mark.parametrize("kind", [ARX, FIR, Subspace])
+def test_lengths_in_periods_count_those_before_the_stop(kind):
+    waves = np.sin(2 * np.pi * DT * np.arange(900) / np.repeat([2.0, 0.5], [300, 600]))
+    run = record(DT, heave=np.random.default_rng(0).normal(waves, 0.1), eta_fwd=waves)
+    spec = replace(SPECS[kind.kind], input_delays="1 T")
+    assert spec.fit(run, ["heave"], ["eta_fwd"], stop=29.9).settings.input_delays == 20
+
+
 def test_fir_finds_a_known_impulse_response():
     rng = np.random.default_rng(5)
     response, u = rng.normal(size=(2, 12)), rng.normal(size=2000)
