@@ -70,6 +70,10 @@ class SensorsKind(Kind):
         "Check the water depth, [rig.positions], and signs and clocks of the probes. At forward "
         "speed dispersion does not hold: leave water_depth out of [rig].",
     )
+    CELERITY = (
+        "correlates by only {value:.2f} with {other} at the lag of which the run's celerity is "
+        "({celerity:.2f} m/s), which may be wrong"
+    )
 
 
 def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreement]:
