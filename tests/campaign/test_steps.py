@@ -228,7 +228,27 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     # The start-up is used by none: what lies before the spans decides nothing.
     run = two_probes(tmp_path, "eta_a = 4.0\neta_b = 5.0", "train = [61, 90]\ntest = [90, 119]")
     assert_allclose(run.attrs["celerity"], 2.0, rtol=1e-3)
+    assert not findings(run, "CELERITY")
     assert "celerity" not in two_probes(tmp_path, "eta_a = 4.0\neta_b = 4.0").attrs
+
+
+@pytest.mark.parametrize(("part", "kind", "told"), [
+    (0.55, "irregular", 0), (0.45, "irregular", 1), (0.45, "still", 0),
+])  # fmt: skip
+def test_a_celerity_between_waves_that_are_hardly_alike_is_told(tmp_path, part, kind, told):
+    """One sea that passes both probes, and another at the second."""
+    t, both = np.arange(0, 400, 0.05), sea(1)
+    second = part * both.at(t, 0.5) + np.sqrt(1 - part**2) * sea(2).at(t)
+    text = (
+        "[rig]\nwater_depth = 3.6\n[rig.positions]\neta_a = 4.0\neta_b = 4.5\n"
+        f"[channels.eta_a]\n[channels.eta_b]\n[runs.r]\nwaves = '{kind}'"
+    )
+    run = prepared(tmp_path, {"eta_a [m]": 0.02 * both.at(t), "eta_b [m]": 0.02 * second}, text, t)
+    found = [each.text for each in findings(run, "CELERITY")]
+    assert found == told * [
+        "correlates by only 0.41 with eta_a at the lag of which the run's celerity is "
+        f"({run.attrs['celerity']:.2f} m/s), which may be wrong"
+    ]
 
 
 def test_a_sensor_that_sticks_is_reported_in_times_that_jitter(tmp_path):

@@ -141,7 +141,15 @@ def _body_step(
             felt = GRAVITY * rotation_matrix(angles)[:, 2, axis]
             at_rest = GRAVITY if settings.zeroed and axis == 2 else 0.0
             series = series + at_rest - felt
-        return _afloat(series, axis), unit, words
+        mean = float(np.mean(series))
+        if axis == 2 and abs(mean) > 0.5 * GRAVITY:  # gravity was counted wrongly
+            raise DataError(
+                f"without gravity the mean upward acceleration is {mean:.3g} m/s^2, which no "
+                f"floating body keeps up. An accelerometer along z reads +{GRAVITY} m/s^2 at rest: "
+                "where its readings were set to zero there, or hold no gravity, state zeroed = "
+                "true; where they are reversed, sign = -1 in its [channels.NAME]."
+            )
+        return series, unit, words
     offset = settings.offset or (0.0, 0.0, 0.0)
     vector = np.zeros((series.size, 3))
     vector[:, axis] = series
@@ -158,19 +166,6 @@ def _body_step(
             "accelerations (m/s^2) are transferred. Choose another channel."
         )
     return moved[:, axis], unit, f"{offset} m from where it was measured"
-
-
-def _afloat(acceleration: FloatArray, axis: int) -> FloatArray:
-    """Refuse a mean upward acceleration that no floating body has: gravity was counted wrongly."""
-    mean = float(np.mean(acceleration))
-    if axis == 2 and abs(mean) > 0.5 * GRAVITY:
-        raise DataError(
-            f"without gravity the mean upward acceleration is {mean:.3g} m/s^2, which no floating "
-            f"body keeps up. An accelerometer along z reads +{GRAVITY} m/s^2 at rest: where its "
-            "readings were set to zero there, or hold no gravity, state zeroed = true; where they "
-            "are reversed, sign = -1 in its [channels.NAME]."
-        )
-    return acceleration
 
 
 def _axis(name: str, settings: DerivedSettings) -> int:

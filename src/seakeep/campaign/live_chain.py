@@ -88,7 +88,15 @@ class LiveChain:
             key: self._run.clocks[key].reference(rows[key][name] * factor)
             for key, (name, factor) in self._time.items()
         }
-        self._check_all_send(instants)
+        # Nothing can be made without a silent logger, and the others' rows pile up.
+        start = min((each[0] for each in instants.values() if each.size), default=0.0)
+        latest = {key: each[-1] if each.size else start for key, each in instants.items()}
+        last = min(latest, key=latest.__getitem__)
+        if (silent := max(latest.values()) - latest[last]) > self.window:
+            raise RequestError(
+                f"'{last}' has sent nothing for {silent:g} s, and samples are made of all loggers. "
+                "Send rows of it up to the others' instants, NaN in its columns."
+            )
         origin, given, ready = self._origin, self._given, 0
         if all(each.size for each in instants.values()):
             if origin is None:
@@ -96,8 +104,7 @@ class LiveChain:
                 firsts = [each[0] for each in instants.values()]
                 origin = firsts[0]
                 given = math.ceil((max(firsts) - origin + self.delay) / self.dt - 1e-6)
-            newest = min(each[-1] for each in instants.values())
-            ready = math.floor((newest - self.delay - origin) / self.dt + 1e-9) + 1
+            ready = math.floor((latest[last] - self.delay - origin) / self.dt + 1e-9) + 1
         if origin is None or ready - given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
             out = xr.Dataset(empty, {"time": np.empty(0)})
@@ -200,18 +207,6 @@ class LiveChain:
         if past.any():
             arrays[name] = counted[last.size :] / factor
         return arrays
-
-    def _check_all_send(self, instants: Mapping[str, FloatArray]) -> None:
-        """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
-        start = min((each[0] for each in instants.values() if each.size), default=0.0)
-        newest = {key: each[-1] if each.size else start for key, each in instants.items()}
-        last = min(newest, key=newest.__getitem__)
-        silent = max(newest.values()) - newest[last]
-        if silent > self.window:
-            raise RequestError(
-                f"'{last}' has sent nothing for {silent:g} s, and samples are made of all loggers. "
-                "Send rows of it up to the others' instants, NaN in its columns."
-            )
 
     def _prepared(
         self, rows: Mapping[str, dict[str, FloatArray]], origin: float, first: int, stop: int

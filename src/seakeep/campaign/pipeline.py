@@ -62,6 +62,7 @@ from seakeep.quality.faults import (
     reading_step,
     saturated,
 )
+from seakeep.quality.sensors import SensorsKind
 from seakeep.signals import (
     Clock,
     bridge,
@@ -90,6 +91,10 @@ COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""
 JUMP = 0.1
 """Part of a turn within which a step is a whole turn: an angle was read on either side of zero."""
+ALIKE, CORRELATED = 0.5, "celerity_correlation"
+"""Correlation of the waves at two probes below which the celerity found from them is in doubt: in
+made-up seas, long- and short-crested, the highest peak stood a period away, and the celerity was a
+third too low, only at 0.44 or less. Between the probes of the virtual tank it is 0.55."""
 MOST_FINER = 8.0
 """Times finer than the fastest logger of a run that its step may be: waves of four samples get the
 32 of the paper's; with times in another unit it is 1000."""
@@ -698,7 +703,11 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
         anti_alias=preparation.anti_alias,
         left_out=left_out,
     )
-    return replace(run, findings=[*check(record), *run.findings])
+    found, probes, alike = check(record), settings.celerity_channels, run.data.attrs.get(CORRELATED)
+    if probes and alike and alike < ALIKE and record.waves != "still":
+        details = {"other": probes[0], "celerity": run.data.attrs["celerity"]}
+        found.append(record.finding(SensorsKind.CELERITY, probes[1], alike, ALIKE, **details))
+    return replace(run, findings=[*found, *run.findings])
 
 
 def _part(
@@ -748,4 +757,4 @@ def celerity_of(run: Run, dt: float) -> dict[str, float]:
         found = effective_celerity(first, last, dt, apart, rig.water_depth)
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return {}
-    return {"celerity": found.celerity, "celerity_correlation": found.correlation}
+    return {"celerity": found.celerity, CORRELATED: found.correlation}

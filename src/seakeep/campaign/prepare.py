@@ -47,7 +47,7 @@ from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import lengths, parse_length, read_toml, validated
 
-FORMAT = 17
+FORMAT = 18
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 PREPARED = "prepared run"
 """Kind of the files of prepared runs, which sets them apart from measurements."""
@@ -410,13 +410,14 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = checked(cropped(resampled(run, dt)), surveyed.left_out)
+                run = cropped(resampled(run, dt))
+                run.data.attrs.update(self._attributes(run, dt))
+                run = checked(run, surveyed.left_out)
                 warn_of(run.findings, reported)
                 data = run.data
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
                     channel.attrs["noise_std"] = noise_floor(channel.values)
-                data.attrs.update(self._attributes(run, dt))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
                 failure = error if is_named else type(error)(f"run '{name}': {error}")

@@ -363,21 +363,17 @@ def _columns(path: Path, frame: pd.DataFrame, layout: _Layout) -> Columns:
         first = str(column.get(column.first_valid_index())).strip()
         if _INSTANT.match(first):
             zone = " in UTC" if _ZONE.search(first) else ""
-            column, out.units[name] = _days(column), f"days since {DAY_0}{zone}"
+            out.units[name] = f"days since {DAY_0}{zone}"
+            text = column.str.replace(",", ".")
+            instants = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
+            others = column.where(instants.isna())
+            days = (instants - pd.Timestamp(DAY_0, tz="UTC")) / pd.Timedelta("1D")
+            column = others if others.count() else days  # a column of both has a fault
         try:
             out.values[name] = _numbers(path, name, column, layout)
         except DataError as error:
             out.faults[name] = str(error)
     return out
-
-
-def _days(column: pd.Series) -> pd.Series:
-    """Serial days of instants of ISO 8601; of a column that holds others, these alone."""
-    text = column.str.replace(",", ".")
-    instants = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
-    others = column.where(instants.isna())
-    days = (instants - pd.Timestamp(DAY_0, tz="UTC")) / pd.Timedelta("1D")
-    return others if others.count() else days
 
 
 def _numbers(path: Path, name: str, column: pd.Series, layout: _Layout) -> FloatArray:

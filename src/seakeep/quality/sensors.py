@@ -70,6 +70,10 @@ class SensorsKind(Kind):
         "Check the water depth, [rig.positions], and signs and clocks of the probes. At forward "
         "speed dispersion does not hold: leave water_depth out of [rig].",
     )
+    CELERITY = (
+        "correlates by only {value:.2f} with {other} at the lag of which the run's celerity is "
+        "({celerity:.2f} m/s), which may be wrong"
+    )
 
 
 def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreement]:
@@ -329,7 +333,7 @@ def compare_sensors(
     length = 4 * period if window is None else window
     if not 0 < gain < np.inf or x.size * dt < length + period:
         return nothing
-    stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
+    stuck = np.broadcast_to(np.asarray(stuck_samples, bool), x.shape)  # none of None
 
     def moving(length: float) -> tuple[Lags, list[slice]]:
         """Lags in windows with enough motion, and the samples of these."""

@@ -274,8 +274,11 @@ def misplaced_probes(
     Regular waves before a model are left out for a reason: on the measured ship section their
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
-    known = {name: as_series(each) for name, each in elevations.items() if name in positions}
-    telling = {name: series for name, series in known.items() if _telling(series)}
+    telling = {
+        name: series
+        for name, each in elevations.items()
+        if name in positions and _telling(series := as_series(each))
+    }
     names = sorted(telling, key=positions.__getitem__)
     pairs = list(pairwise(names))
     if len(names) > 2:

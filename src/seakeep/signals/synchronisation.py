@@ -361,17 +361,16 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     error = float(weights.sum() ** -0.5)
     if weights @ (drifts - mean) ** 2 > scipy.stats.chi2.ppf(0.999, len(known) - 1):
         return list(clocks)
-
-    def pooled(clock: Clock) -> Clock:
-        if not clock.known:
-            return clock
-        return replace(
+    return [
+        replace(
             clock.with_drift(mean, f"drift of {len(known)} runs"),
             offset_error=math.hypot(clock.reading_error(clock.centre), clock.centre * error),
             drift_error=error,
         )
-
-    return [pooled(clock) for clock in clocks]
+        if clock.known
+        else clock
+        for clock in clocks
+    ]
 
 
 def without_doubtful_drift(clock: Clock) -> Clock:

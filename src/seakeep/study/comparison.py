@@ -302,7 +302,12 @@ def read_tests(
         at, last = samples_in(run, used, span, model.dt, history, lead, first)
         begin = float(run["time"][at]) if first is None else first
         windows[label, name] = begin, count or max(last - at, 1)
-        model.read_windows(run, [begin], windows[label, name][1])
+        try:
+            model.read_windows(run, [begin], windows[label, name][1])
+        except DataError as error:
+            others = " --run ".join(each for each in prepared if each != name)
+            mend = f" Or leave {name} out: --run {others}." if others else ""
+            raise DataError(f"{error}{mend}") from None
     return prepared, windows
 
 
