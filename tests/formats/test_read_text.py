@@ -296,6 +296,10 @@ NO_TABLE = {
         r"repeat: 1700000000\.25 s stands at samples 0 and 1 \(1 .* the clock stood",
     "t,heave,pitch\n0,1,\n0,1,\n1,2,3\n":
         "the times of .*run.csv repeat: 0 s .* Remove the double rows, or raise the",
+    "t,heave,pitch\n0,1,\n1,2,3\n2,2,3\n0,1,\n1,2,3\n3,2,3\n":
+        r"^2 row\(s\) of .*run.csv are there twice, .* first is sample 3, of 0 s, which stands at s"
+        "ample 0 too. Remove the double",
+    "t,heave\n0,1\n1,2\n0,1\n1,3\n": "not sorted: 0 s follows 1 s at sample 2",
     "t,t,heave\n0,0,1\n1,1,2\n": "2 columns have the name 't'",
 }  # fmt: skip
 

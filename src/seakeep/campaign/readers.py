@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from seakeep.arrays import FloatArray
@@ -228,11 +229,20 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
             "[files]."
         )
     times = past_midnight(table.values[name] * factor)
-    # Rows that are there twice are left to `check_order`.
-    if (again := np.flatnonzero(np.diff(times) == 0)).size:
-        pairs = [(x[again], x[again + 1]) for each, x in table.values.items() if each != name]
-        same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
-        if pairs and np.all(same, axis=0).mean() <= 0.5:
+    steps = np.diff(times)
+    if (steps <= 0).any():
+        double = pd.DataFrame(table.values).duplicated().to_numpy()
+        if (steps < 0).any() and (np.diff(times[~double]) > 0).all():
+            at = np.argmax(double)
+            raise DataError(
+                f"{double.sum()} row(s) of {path} are there twice, with the same time and the same "
+                f"readings: the first is sample {at}, of {instant_text(times[at], 0)} s, which "
+                f"stands at sample {np.argmax(times == times[at])} too. Remove the double rows; "
+                "the times of the others are sorted."
+            )
+        # Double rows that follow one another are left to `check_order`.
+        again = np.flatnonzero(steps == 0)
+        if again.size and double[again + 1].mean() <= 0.5:
             first = again[0]
             raise DataError(
                 f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples "

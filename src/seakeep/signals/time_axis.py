@@ -159,11 +159,10 @@ def check_order(time: ArrayLike, name: str) -> FloatArray:
             "number of decimals the logger writes."
         )
     if (falling := np.flatnonzero(steps < 0)).size:
-        at, double = falling[0], t.size - np.unique(t).size
-        once = f" and remove the {double} whose time another row has" if double else ""
+        at = falling[0]
         raise DataError(
             f"the times of {name} are not sorted: {_shown(t, at + 1)} follows {_shown(t, at)} at "
-            f"sample {at + 1}. Sort the rows by time{once}, or split the file where the clock was "
+            f"sample {at + 1}. Sort the rows by time, or split the file where the clock was "
             "restarted."
         )
     return t
