@@ -65,6 +65,9 @@ def test_drift_is_counted_from_the_rest_in_the_wind_of_the_run():
     assert found.attrs["rest"] == "measured in calm"
     # A quarter of a record holds no whole periods of the wind; 0.4 m are 1.6 m per m².
     assert_near(found.offset[0, 0], law, 0.1)
+    swings = calm.assign(surge=calm.surge + 1.0 + 5.0 * np.sin(0.3 * calm.time / DT))
+    runs = {"regular": blown(REGULAR, 7.0, 0.4), "calm": calm, "decay": swings}
+    assert_near(check.drift(model, runs).offset[0, 0], law, 0.1)
 
 
 def test_drift_is_probed_where_waves_train_alone():

@@ -77,9 +77,19 @@ def test_a_floor_is_found_where_a_line_rests_on_it(taut):
     pull = 2.0 * states[:, 0] + 0.3 * states[:, 1]
     slack = np.maximum(np.quantile(pull, 1 - taut), pull)
     noise = 0.05 * rng.normal(size=len(pull))
-    floor = floor_of(states, slack + noise, [0, 1])
+    runs = np.zeros(len(pull), int)
+    floor = floor_of(states, slack + noise, [0, 1], runs)
     # The 0.002 quantile of all is that of 10 to 0.4 % of the slack ones.
     assert -3 * 0.05 < floor - np.quantile(pull, 1 - taut) < -0.05
-    assert floor_of(states, pull + noise, [0, 1]) == -np.inf
+    assert floor_of(states, pull + noise, [0, 1], runs) == -np.inf
     regular = np.stack([np.sin(np.arange(4000) / 5), np.cos(np.arange(4000) / 5)], axis=1)
-    assert floor_of(regular, 2.0 * regular[:, 0] + noise, [0, 1]) == -np.inf
+    assert floor_of(regular, 2.0 * regular[:, 0] + noise, [0, 1], runs) == -np.inf
+
+
+def test_zeros_of_a_sensor_that_differ_from_run_to_run_are_no_floor():
+    runs, rng = np.repeat(range(4), 2000), default_rng(1)
+    states = rng.normal(np.array([0.0, 0.0, -2.5, -2.0])[runs, None], 1.0, (8000, 1))
+    load = 0.6 * np.exp(0.5 * states[:, 0]) + rng.normal(0.0, 0.02, 8000)
+    measured = load + np.array([-0.3, -1.4, 0.2, 1.2])[runs]
+    assert np.isfinite(floor_of(states, measured, [0], 0 * runs))
+    assert floor_of(states, measured, [0], runs) == -np.inf

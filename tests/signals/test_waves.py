@@ -1,5 +1,6 @@
 """Zero crossings, the encounter period, spectra and heights."""
 
+from dataclasses import replace
 from math import tau
 
 import numpy as np
@@ -13,6 +14,7 @@ from seas import sea
 
 from seakeep.signals import (
     encounter_period,
+    repeated_waves,
     wave_heights,
     wave_spectrum,
     wave_statistics,
@@ -34,6 +36,17 @@ def test_waves_are_regular_with_a_start_and_harmonics_and_a_narrow_sea_is_not():
     for seed in range(5):  # eight waves or so
         assert not is_regular(sea(seed, band=(0.38, 0.7)).at(np.arange(0, 16, 0.02)))
     assert not is_regular(sea(0, band=(0.7, 1.3), peak=1.1).at(np.arange(0, 100, 0.02)))
+
+
+def test_a_focused_group_repeats_no_sea_that_holds_a_group_like_it():
+    t = np.arange(0, 120, 0.1)
+    seas = [sea(seed, band=(0.38, 0.6)) for seed in range(20)]
+    records = {str(seed): each.at(t) for seed, each in enumerate(seas)}
+    group = replace(seas[0], phase=-tau * 60 * seas[0].frequency).at(t)
+    group *= 3.0 / group.max()
+    records |= {"group": group, "again": np.roll(group, 30), "cut": records["3"][200:800]}
+    alike = {name: first for name, first in repeated_waves(records, 0.1).items() if name != first}
+    assert alike == {"again": "group", "cut": "3"}
 
 
 def test_the_spectrum_holds_the_variance():

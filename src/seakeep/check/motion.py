@@ -312,7 +312,8 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         probe); over (point, state): ``offset`` and ``offset_uncertainty`` of regular runs,
         per amplitude squared, counted from the rest in still water where all but the waves is as in
         the run, with ``run`` and ``point_frequency``. The rest is the mean over the last quarter of
-        runs in still water, decays among them; without such runs it is the model's. ``attrs``:
+        runs in still water, decays among them, each weighted by the inverse of its variance there;
+        without such runs it is the model's. ``attrs``:
         ``amplitude`` (m), ``reference``, and ``rest``, where that is from.
 
     Raises
@@ -374,8 +375,11 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         means = np.concatenate([single.input_scale.mean, single.signature.direct_scale.mean])
         rests = single.state_mean + (columns - means) @ slow[0].real.T
         rests, still = np.split(rests, [at.sizes["point"]])
-        if ends:  # what the model errs in still water
-            rests += np.mean([x.mean(axis=0) for x, _ in ends.values()] - still, axis=0)
+        if ends:  # what the model errs in still water; what still swings says little of it
+            errors = np.stack([x.mean(axis=0) for x, _ in ends.values()]) - still
+            moved = np.stack([x.var(axis=0) for x, _ in ends.values()])
+            moved += 1e-9 * single.state_scale.spread**2
+            rests += np.average(errors, axis=0, weights=1.0 / moved)
         square = at["wave_amplitude"].values[:, None] ** 2
         offset = at["offset"].values + single.state_scale.centre - rests
         offsets = {

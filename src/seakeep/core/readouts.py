@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, IntArray
 
 KNOTS = (0.15, 0.3, 0.5, 0.7, 0.85)
 """Quantiles of the surge at which the load bends."""
@@ -151,7 +151,7 @@ def best_place(products: FloatArray) -> int:
     return int(errors.argmin())
 
 
-def floor_of(states: FloatArray, target: FloatArray, columns: list[int]) -> float:
+def floor_of(states: FloatArray, target: FloatArray, columns: list[int], runs: IntArray) -> float:
     """Floor of a channel that rests on it, and −inf of one that does not.
 
     Where a line is slack its load stays as the motion goes on: in the tail of samples in which a
@@ -166,13 +166,17 @@ def floor_of(states: FloatArray, target: FloatArray, columns: list[int]) -> floa
         The channel.
     columns : list of int
         States that bend it.
+    runs : ndarray of int, shape (sample,)
+        Run of each sample, from 0 on; the map has a constant for each, since zeros of a sensor that
+        differ from run to run look like a floor.
 
     Returns
     -------
     float
         The ``FLOOR`` quantile of the channel, or −inf.
     """
-    bending = np.concatenate([states[:, columns], np.ones((len(states), 1))], axis=1)
+    constants = runs[:, None] == np.arange(runs.max() + 1)
+    bending = np.concatenate([states[:, columns], constants], axis=1)
     linear = bending @ np.linalg.lstsq(bending, target, rcond=None)[0]
     rests = any(_slope(linear, target, part) < FLAT for part in LOWEST)
     return float(np.quantile(target, FLOOR)) if rests else -np.inf

@@ -79,7 +79,8 @@ def fit_readouts(
     signature = data.signature
     states = [signature.state_scale.physical(values) for values in data.states]
     windows = zip(states, data.windows, strict=True)
-    seen = np.concatenate([values[window.samples] for values, window in windows])
+    parts = [values[window.samples] for values, window in windows]
+    seen, of_run = np.concatenate(parts), np.repeat(range(len(parts)), [*map(len, parts)])
     follows, out = signature.input_map.follows, []
     judged = [] if follows is None else [*held]
     places, waves = np.zeros(0), []
@@ -94,7 +95,7 @@ def fit_readouts(
         columns = motions_of(signature.state_labels, channel)
         units, floor = signature.state_labels[column].units, -math.inf
         if not signature.input_map.reference:  # departures from each run's means have none
-            floor = floor_of(seen, seen[:, column], columns)
+            floor = floor_of(seen, seen[:, column], columns, of_run)
         kind: ReadOutKind = "none" if asked == "auto" else asked
         scores: dict[str, float] = {}
         load = None

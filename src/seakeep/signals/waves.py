@@ -118,8 +118,9 @@ Repetitions of one regular wave in a flume have 0.96 and 0.98 or more; waves of 
 heights 0.92 and 0.5, and waves whose periods differ by 2 % 0.75.
 """
 
-OVERLAP = 0.75
-"""Part of the shorter record over which two must agree: a few waves are alike in any two seas."""
+OVERLAP, FEW = 0.75, 10
+"""Part of the shorter record over which two must agree, and of the longer one where that is fewer
+waves: a few, such as a focused group, are alike in any two seas."""
 
 PER_WAVE = 8
 """Samples of the shortest waves that are enough to compare records."""
@@ -140,7 +141,8 @@ def repeated_waves(records: Mapping[str, ArrayLike], dt: float) -> dict[str, str
     dict of str to str
         By run, the first run of its group. Two records repeat each other where they correlate to
         0.9 or more at the lag of their best agreement, over three quarters of the shorter one or
-        more, and their standard deviations there differ by a tenth at most.
+        more (of the longer one, if that is fewer than ten of the shortest waves), and their
+        standard deviations there differ by a tenth at most.
 
     Examples
     --------
@@ -166,7 +168,8 @@ def _are_alike(one: FloatArray, other: FloatArray) -> bool:
     lags = scipy.signal.correlation_lags(len(one), len(other))
     lag = lags[np.argmax(scipy.signal.correlate(one, other, method="fft"))]
     begin, end = max(lag, 0), min(len(one), len(other) + lag)
-    if end - begin < OVERLAP * min(len(one), len(other)):
+    short, long = sorted((len(one), len(other)))
+    if end - begin < OVERLAP * (short if end - begin >= FEW * PER_WAVE else long):
         return False
     one, other = one[begin:end], other[begin - lag : end - lag]
     small, large = sorted((one.std(), other.std()))
