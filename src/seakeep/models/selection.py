@@ -34,7 +34,7 @@ from seakeep import metrics
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.core.embedding import PrimalSystem, spread_means, training_window
 from seakeep.core.solve import ridge_path
-from seakeep.errors import DataError, RequestError, did_you_mean, quiet
+from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.executor import in_order
 from seakeep.models import labelled
 from seakeep.models.candidates import Candidates, Columns, Step, alignments_of
@@ -226,6 +226,16 @@ class Problem:
         """Samples that delayed regressors look ahead too far."""
         return self.widest.lead - candidate.lead
 
+    @property
+    def reader(self) -> Signature:
+        """What windows are read for; units were compared when the runs were gathered."""
+        signature = self.data.signature
+        states, inputs = (
+            tuple(replace(label, units="") for label in labels)
+            for labels in (signature.state_labels, signature.input_labels)
+        )
+        return replace(signature, state_labels=states, input_labels=inputs)
+
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray]:
         """Which delayed and direct regressors a candidate has."""
         chain = self.data.signature.input_map
@@ -312,9 +322,7 @@ class Problem:
                 if starts
             ]
             states, found = data.signature.state_scale.physical(data.states[run]), []
-            with quiet():  # units were compared when the runs were gathered
-                read = read_groups(data.signature, self.runs, places)
-            for windows in read:
+            for windows in read_groups(self.reader, self.runs, places):
                 starts = new[windows.steps]
                 measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
                 # Read-outs are learnt from departures.
