@@ -74,7 +74,7 @@ input_delays = "5 T"
 T̂ is `encounter_period` of `[campaign]`. If that is not stated, T̂ is measured: the mean zero-up-crossing period of the wave
 channel over the irregular runs (all with waves if none is), in the used part of each run; runs of fewer than ten waves
 have no part in it where others hold more. Test runs count too: another test file changes T̂, and with it the step of
-`steps_per_period` and all lengths in periods. State `encounter_period` to keep them; of a model that was fitted before, the error of its time step states the one. The keys on which this measurement depends (spans of those runs, windows of
+`steps_per_period` and all lengths in periods. State `encounter_period` to keep them: where a model was fitted with another step, the error names the period that restores it. The keys on which this measurement depends (spans of those runs, windows of
 clocks) can be in periods only if `encounter_period` is stated; a message says so. Lengths of models are rounded to the nearest number of samples; they may be in seconds too (`"0.5 s"`), and bare numbers count samples.
 
 ## Priors

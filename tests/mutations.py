@@ -40,7 +40,7 @@ CHANGES = {
     "campaign/guesses.py": [
         ("< step / usual < 2000", "< usual / step < 2000", "campaign/test_drafts.py::test_one_file_in_milliseconds_is_drafted_as_such"),
         ("one.run == other.run if one.is_like(other)", "False if one.is_like(other)", "campaign/test_drafts.py::test_files_that_fit_no_run_or_logger_are_named"),
-        ('self.is_motion and "down" in', 'False and "down" in', "campaign/test_drafts.py::test_a_draft_of_measurements_at_sea"),
+        ('startswith("heave") and "down" in', 'False and "down" in', "campaign/test_drafts.py::test_a_draft_of_measurements_at_sea"),
         ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
         ("np.diff(past_midnight(series))", "np.diff(series)", "campaign/test_drafts.py::test_a_draft_tells_days_and_midnights"),
         ("step < SERIAL", "step < 0", "campaign/test_drafts.py::test_a_draft_tells_days_and_midnights"),
@@ -323,7 +323,7 @@ CHANGES = {
         ("enumerate(at) if each <= place]", "enumerate(at)]", "models/test_live.py::test_a_dead_probe_is_filled_by_no_more_than_waves"),
     ],
     "models/baselines.py": [
-        ("not np.isfinite(found).all()", "False", "test_doors.py::test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it"),
+        ("not np.isfinite(coefficients).all()", "False", "test_doors.py::test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it"),
         ("factor = 1.0", "factor = 0.5", "models/test_baselines.py::test_mean_and_hold_last_are_what_they_say_and_read_no_input"),
         ("np.hstack([np.zeros((size, size))", "np.hstack([np.eye(size)", "models/test_baselines.py::test_fir_finds_a_known_impulse_response"),
         ("else values + windows.zero[:, None]", "else values", "models/test_centre.py::test_a_zero_moves_the_forecast_and_changes_nothing_else"),
@@ -520,7 +520,7 @@ CHANGES = {
         ("period = 2.0 * seconds / crossings", "period = seconds / crossings", "models/test_slow.py::test_the_period_of_a_slow_drift_is_found"),
         ("1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])", "np.sqrt(self.edges[:-1] * self.edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
         ("unseen > 0.5)", "unseen > 2.0)", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
-        ("heights > STILL * self.heights", "heights > 0", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
+        ("heights > STILL * self.heights", "heights > 0", "check/test_peaks.py::test_periods_of_an_input_that_is_still_are_judged_of_waves_alone"),
         ("heights > margin * self.heights", "heights > 9 * margin * self.heights", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("steepnesses > margin * self", "steepnesses < margin * self", "hosts/test_estimator.py::test_what_lies_outside_the_training_is_that_of_the_live_model"),
         ("len(inputs) <= 8 * self.quarter(dt)", "False", "models/test_contracts.py::test_higher_waves_and_a_drift_are_outside"),

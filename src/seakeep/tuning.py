@@ -18,7 +18,7 @@ from seakeep.errors import RequestError
 from seakeep.files import read_bytes, write_text
 from seakeep.models import HankelDMDc
 from seakeep.models.baselines import RIVALS
-from seakeep.models.labelled import Given, Runs, Stop, channel_matrix
+from seakeep.models.labelled import Runs, Stop, TrainingRuns, channel_matrix
 from seakeep.models.readouts import readouts_json
 from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds, HankelSettings, Select
@@ -171,11 +171,11 @@ def tune(
             f"folds must be {', '.join(map(repr, FOLDS))} or an integer of at least 2; received "
             f"{folds!r}."
         )
-    given = Given.of(runs, states, inputs, stop)
+    given = TrainingRuns.of(runs, states, inputs, stop)
     known: MutableMapping[str, Any] = {}
     if resume is not None:
         asked = [spec.to_json(), sorted(vary), list(horizon), folds]
-        known = _Scores(Path(resume), _digest(asked, given.runs, [*states, *inputs]))
+        known = _Scores(Path(resume), _digest(asked, given.runs, [*given.states, *given.inputs]))
     spec = spec.resolved_in(given.runs, given.inputs)
     open_to = spec.select or Select()
     found = select(

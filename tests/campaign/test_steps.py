@@ -246,7 +246,7 @@ def test_a_celerity_between_waves_that_are_hardly_alike_is_told(tmp_path, part, 
     run = prepared(tmp_path, {"eta_a [m]": 0.02 * both.at(t), "eta_b [m]": 0.02 * second}, text, t)
     found = [each.text for each in findings(run, "CELERITY")]
     assert found == told * [
-        "correlates by only 0.41 with eta_a at the lag of which the run's celerity is "
+        "correlates by only 0.41 with eta_a at the lag that gives the run's celerity "
         f"({run.attrs['celerity']:.2f} m/s), which may be wrong"
     ]
 

@@ -75,7 +75,8 @@ def test_lengths_in_periods_count_those_before_the_stop(kind):
     waves = np.sin(2 * np.pi * DT * np.arange(900) / np.repeat([2.0, 0.5], [300, 600]))
     run = record(DT, heave=np.random.default_rng(0).normal(waves, 0.1), eta_fwd=waves)
     spec = replace(SPECS[kind.kind], input_delays="1 T")
-    assert spec.fit(run, ["heave"], ["eta_fwd"], stop=29.9).settings.input_delays == 20
+    model = spec.fit(run, ["heave"], (name for name in ["eta_fwd"]), stop=29.9)
+    assert (model.settings.input_delays, model.inputs) == (20, ["eta_fwd"])
 
 
 def test_fir_finds_a_known_impulse_response():

@@ -35,6 +35,9 @@ def test_the_wave_is_read_where_the_vessel_goes(models, drift):
 def test_settings_know_the_history_that_carriers_read(models, drift):
     model, period = models["now"], drift.attrs["encounter_period"]
     assert model.history_samples == model.settings.needs(model.dt, period).history + 1
+    # Centred, carriers read ahead in place of the map, whatever its look-ahead.
+    centred = replace(SPEC, centre=40, observables=()).fit(drift, STATES, INPUTS)
+    assert centred.history_samples == centred.settings.needs(centred.dt, period).history + 1
 
 
 def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from records import table
 
 from seakeep import HankelDMDc, Powers, SlowSquares
-from seakeep.models.labelled import ChannelLabel, Given, Span, channel_labels
+from seakeep.models.labelled import ChannelLabel, Span, TrainingRuns, channel_labels
 from seakeep.models.terms import Bound, slow_kernel, slow_squares
 
 PERIOD = 15  # samples
@@ -18,7 +18,7 @@ CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 def fitted(run, lead=12, chosen=CHOSEN):
     spec = HankelDMDc(8, 3 * PERIOD, 1.0, lead=lead, observables=chosen)
-    return spec.input_map(Given({"run": run}, ["surge"], INPUTS), None)
+    return spec.input_map(TrainingRuns({"run": run}, ["surge"], INPUTS), None)
 
 
 def rows(chain, run, first, stop):

@@ -64,7 +64,7 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(make_run, factor, 
 def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stable, radius, rows):
     spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
     unclipped = spec.fit(GROWING, *OF_ARX)
-    with warned(r"is 1\.\d+: a free run grows by [12]\d % per step in .* or set stable = True "):
+    with warned(r"is 1\.\d+: a free run grows by [12]\d % per step in .* or set stable = True\."):
         grows = unclipped.eigenvalues
     assert "UNSTABLE" in unclipped.summary()
     model = replace(spec, stable=stable).fit(GROWING, *OF_ARX)

@@ -15,7 +15,7 @@ from tutorial_study import STUDY, put_tutorial, studied, study_of
 from seakeep import statistics
 from seakeep.core.density import density_grid
 from seakeep.metrics import nrmse
-from seakeep.models.labelled import Given
+from seakeep.models.labelled import TrainingRuns
 from seakeep.models.training import gather, system_of
 from seakeep.report.tables import ratio_of
 from seakeep.study.judge import (
@@ -293,7 +293,7 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
     spec = plan.specs["printed"]
     fitted = spec.fit(parts, *channels)
     # Degrees of freedom of a ridge regression: the trace of its hat matrix.
-    data = gather(Given(parts, *channels), spec)
+    data = gather(TrainingRuns(parts, *channels), spec)
     upper = np.triu(system_of((data.states, data.delayed, data.direct), data.windows, spec).gram)
     gram = upper + np.triu(upper, 1).T
     freedom = np.trace(np.linalg.solve(gram + 3 * np.eye(len(gram)), gram))

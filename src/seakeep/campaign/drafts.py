@@ -83,7 +83,8 @@ def draft_campaign(
         placed = by_folder if len({file.run for file in by_folder}) > 1 else by_name
         shared = set(first.table.names) - {first.time}
         lone = ((placed[0], file) for file in placed[1:] if not shared & set(file.table.names))
-        for one, other in chain(misplaced(placed), lone):
+        damaged = any(file.table.faults for file in read)  # which explains it
+        for one, other in () if damaged else chain(misplaced(placed), lone):
             why = "have no column in common"
             if one.run == other.run:
                 why = "are of one run and have the same columns: leave one out"
@@ -141,6 +142,7 @@ def draft_campaign(
         rates=rates,
         in_ms={f.run for f in read if f.time_unit == "ms"} if len(units) > 1 else (),
         slowest=slowest,
+        moving=moving,
         shortest=shortest,
         # One step for all, no finer than that of the fastest logger.
         every=int(max(rates, default=0.0) * shortest / STEPS),

@@ -159,8 +159,8 @@ class Guess:
 
     @property
     def counts_down(self) -> bool:
-        """Whether it is a motion whose name says that it counts down."""
-        return self.is_motion and "down" in words_of(self.column)
+        """Whether it is a heave, its rate or acceleration, whose name says that it counts down."""
+        return self.channel.startswith("heave") and "down" in words_of(self.column)
 
 
 @dataclass(frozen=True)
@@ -301,7 +301,7 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
         usual = min(own for other, own in steps.items() if file.is_like(other))
         if not said and step < SERIAL:
             table.units[time] = "d"
-        elif not said and 500 < step / usual < 2000:  # the others are in seconds
+        elif time and not said and 500 < step / usual < 2000:  # the others are in seconds
             table.units[time] = "ms"
         from_midnight(table, FileSettings(time=time))
     for placed in placings(files):

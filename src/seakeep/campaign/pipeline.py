@@ -91,7 +91,9 @@ COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""
 JUMP = 0.1
 """Part of a turn within which a step is a whole turn: an angle was read on either side of zero."""
-ALIKE, CORRELATED = 0.5, "celerity_correlation"
+CORRELATED = "celerity_correlation"
+"""Attribute of a run."""
+ALIKE = 0.5
 """Correlation of the waves at two probes below which the celerity found from them is in doubt: in
 made-up seas, long- and short-crested, the highest peak stood a period away, and the celerity was a
 third too low, only at 0.44 or less. Between the probes of the virtual tank it is 0.55."""
@@ -118,7 +120,7 @@ class Logger:
     def dates(self) -> str:
         """Unit of its times if they were dates, which says whether they state a zone, else ""."""
         unit = self.columns.units.get(time_column(self.columns, self.options.time) or "", "")
-        return unit if DAY_0 in unit else ""
+        return unit if unit.removesuffix(" in UTC") == f"days since {DAY_0}" else ""
 
     def column(self, wanted: str) -> FloatArray:
         """Values of a column, by name or full header, in the file's unit."""
@@ -703,11 +705,12 @@ def checked(run: Run, left_out: Mapping[str, str]) -> Run:
         anti_alias=preparation.anti_alias,
         left_out=left_out,
     )
-    found, probes, alike = check(record), settings.celerity_channels, run.data.attrs.get(CORRELATED)
+    findings, probes = check(record), settings.celerity_channels
+    alike = run.data.attrs.get(CORRELATED)
     if probes and alike and alike < ALIKE and record.waves != "still":
         details = {"other": probes[0], "celerity": run.data.attrs["celerity"]}
-        found.append(record.finding(SensorsKind.CELERITY, probes[1], alike, ALIKE, **details))
-    return replace(run, findings=[*found, *run.findings])
+        findings.append(record.finding(SensorsKind.CELERITY, probes[1], alike, ALIKE, **details))
+    return replace(run, findings=[*findings, *run.findings])
 
 
 def _part(

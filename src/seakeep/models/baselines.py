@@ -21,7 +21,7 @@ from seakeep.models.engine import Windows, open_runs
 from seakeep.models.forecasts import Model, counted, weighed_runs
 from seakeep.models.growth import LeadErrors, lead_errors, stretches_of
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Given, Runs, Stop
+from seakeep.models.labelled import Runs, Stop, TrainingRuns
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
@@ -92,7 +92,7 @@ class Constant(Plain):
 
         `inputs` are accepted and not read.
         """
-        given = Given.of(runs, states, [], stop)
+        given = TrainingRuns.of(runs, states, [], stop)
         spec = self.resolved_in(given.runs, [])
         data = gather(given, spec)
         size = len(data.signature.states)
@@ -151,23 +151,23 @@ class LinearSpec(Plain):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> HankelDMDcModel:
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        if self.is_filter and not inputs:
+        given = TrainingRuns.of(runs, states, inputs, stop)
+        if self.is_filter and not given.inputs:
             raise RequestError(
                 f"a {self.kind.upper()} model is a filter of its inputs and has none; name at "
                 "least one input."
             )
-        given = Given.of(runs, states, inputs, stop)
         spec = self.resolved_in(given.runs, given.inputs)
         if self.ridge != "rollout":
             data = gather(given, spec)
             solution = spec.solve(data)
-            count = len(states) * (spec.state_reach + 1) + data.direct[0].shape[1]
-            needed = len(states), count + data.delayed[0].shape[1] * (spec.input_delays + 1)
-            found = solution.coefficients
-            if found.shape != needed or not np.isfinite(found).all():
-                lost = np.count_nonzero(~np.isfinite(found))
+            count = len(given.states) * (spec.state_reach + 1) + data.direct[0].shape[1]
+            needed = len(given.states), count + data.delayed[0].shape[1] * (spec.input_delays + 1)
+            coefficients = solution.coefficients
+            if coefficients.shape != needed or not np.isfinite(coefficients).all():
+                lost = np.count_nonzero(~np.isfinite(coefficients))
                 raise RequestError(
-                    f"solve of '{self.kind}' returned coefficients of shape {found.shape}, "
+                    f"solve of '{self.kind}' returned coefficients of shape {coefficients.shape}, "
                     f"{lost} of them not finite; finite ones of shape {needed} are needed."
                 )
             return HankelDMDcModel.fitted(spec, data, solution, given.runs)
@@ -391,7 +391,7 @@ class Subspace(Plain):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> SubspaceModel:
         """Identify a model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        given = Given.of(runs, states, inputs, stop)
+        given = TrainingRuns.of(runs, states, inputs, stop)
         spec = self.resolved_in(given.runs, given.inputs)
         data = gather(given, spec)
         future = spec.state_delays + 1 if spec.future is None else spec.future

@@ -259,8 +259,8 @@ def held_out(
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
         starts = tuple(run["time"].values[places].astype(float).tolist())
-        asked = [(name, start) for start in starts], steps
-        (windows,) = read_groups(signature, {name: run}, [asked])
+        instants = [(name, start) for start in starts]
+        (windows,) = read_groups(signature, {name: run}, [(instants, steps)])
         ((series, lost),) = member_series(ensemble, [windows], executor, tell)
         values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)

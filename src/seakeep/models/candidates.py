@@ -10,7 +10,7 @@ from typing import Any
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.alignment import LEAD, FittedAlignment, ProbeAlignment
-from seakeep.models.labelled import Given
+from seakeep.models.labelled import TrainingRuns
 from seakeep.models.observables import Powers, SlowSquares
 from seakeep.models.settings import HankelSettings
 from seakeep.models.terms import Observable
@@ -37,7 +37,7 @@ class Candidates:
     ----------
     base : HankelSettings
         Where it starts.
-    given : Given
+    given : TrainingRuns
         Training runs, and channels.
     period, step : float
         Encounter period, samples, and time step, s.
@@ -54,7 +54,7 @@ class Candidates:
     """
 
     base: Any
-    given: Given
+    given: TrainingRuns
     period: float
     step: float
     vary: Sequence[str]
@@ -223,7 +223,9 @@ def default_observables(
     return slow, Powers(elevations)
 
 
-def alignments_of(stated: ProbeAlignment | None, given: Given) -> list[ProbeAlignment | None]:
+def alignments_of(
+    stated: ProbeAlignment | None, given: TrainingRuns
+) -> list[ProbeAlignment | None]:
     """Alignments that these runs allow and that differ, the stated one first, and none.
 
     None reads the measured surge: what is read after a start is no choice of a setting.

@@ -56,7 +56,7 @@ from seakeep.models.forecasts import (
 from seakeep.models.growth import LeadErrors, Stretch, linear_errors
 from seakeep.models.inputs import InputMap, Signature
 from seakeep.models.labelled import Runs
-from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.linear import HankelDMDcModel, spectral_radius
 from seakeep.models.live import Servable
 from seakeep.models.settings import HankelSettings, unit_of
 from seakeep.models.training import RunArrays, TrainingData, departing, member_data
@@ -708,8 +708,8 @@ class HankelEnsemble(Servable):
     @property
     def _serving(self) -> tuple[Self, list[Dynamics], LeadErrors | None]:
         """What forecasts in service, what its filter predicts with, and errors in training."""
-        held = self.hold()
-        return held, held._means, held.errors
+        members = self.hold()
+        return members, members._means, members.errors
 
     @property
     def _means(self) -> list[Dynamics]:
@@ -887,11 +887,6 @@ class HankelEnsemble(Servable):
 
 def _spectral_radius(ensemble: HankelEnsemble, number: int) -> float:
     return spectral_radius(ensemble.dynamics(number))
-
-
-def spectral_radius(dynamics: Dynamics) -> float:
-    """Largest modulus of an eigenvalue of Â."""
-    return float(np.abs(np.linalg.eigvals(dynamics.system)).max())
 
 
 def _range(values: Sequence[float] | FloatArray, form: str) -> str:

@@ -84,7 +84,7 @@ def as_runs(runs: Runs) -> Groups:
     return named
 
 
-class Given(NamedTuple):
+class TrainingRuns(NamedTuple):
     """Training runs, which end where training ends, and the channels of a model."""
 
     runs: Datasets
@@ -97,32 +97,35 @@ class Given(NamedTuple):
 
         Lists of channels that are strings, empty, repeated or overlapping are refused.
         """
+        channels = list[list[str]]()
         for what, names in (("states", states), ("inputs", inputs)):
             if isinstance(names, str):
                 raise RequestError(
                     f"{what} must be a list of channel names; received the string '{names}'. "
                     f"Write {what}=['{names}']."
                 )
-            listed = isinstance(cast("object", names), Iterable)
-            if not listed or not all(isinstance(cast("object", name), str) for name in names):
+            given: Any = names
+            listed = [*given] if isinstance(given, Iterable) else [given]
+            if not all(isinstance(name, str) for name in listed):
                 raise RequestError(
                     f"{what} must be a list of channel names; received {reprlib.repr(names)}. A "
                     "model without input takes inputs=[]."
                 )
-            if double := {name for name in names if list(names).count(name) > 1}:
+            if double := {name for name in listed if listed.count(name) > 1}:
                 raise RequestError(
                     f"{what} names {', '.join(sorted(double))} more than once. Name each channel "
                     "once."
                 )
-        if len(states) == 0:
+            channels.append(listed)
+        states, inputs = channels
+        if not states:
             raise RequestError("states is empty: name at least one channel to forecast.")
         if both := set(states) & set(inputs):
             raise RequestError(
                 f"{', '.join(sorted(both))} is both a state and an input. A state is forecast and "
                 "an input is given: choose one."
             )
-        # Arrays of names are welcome too.
-        return cls(until(as_runs(runs), stop), list(states), list(inputs))
+        return cls(until(as_runs(runs), stop), states, inputs)
 
 
 def until(runs: Datasets, stop: Stop) -> Groups:

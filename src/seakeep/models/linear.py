@@ -234,8 +234,7 @@ class HankelDMDcModel(Servable):
                 f"the spectral radius of the model is {abs(values[0]):.6f}: a free run grows by "
                 f"{100 * (abs(values[0]) - 1):.2g} % per step in its worst mode and will diverge "
                 "if it is long. Raise ridge, train on more data, use fewer state delays, look for "
-                "transients at the ends of the training runs, or set stable = True (of a model "
-                "without parameter)."
+                "transients at the ends of the training runs, or set stable = True."
             )
         return values
 
@@ -608,14 +607,14 @@ class HankelDMDcModel(Servable):
             *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}{memory}"),
             *chosen,
         ]
-        over, where = self.over_range, ""
+        shown, where = self, ""
         if (varies := self.variation) is not None:
             lines.append(
                 f"  parameter     {self.signature.parameter}, trained from {varies.low:g} to "
                 f"{varies.high:g}; modes in the middle, {varies.centre:g}"
             )
-            where = ", the largest at both ends and the middle"
-        radius = max(each.spectral_radius for each in over)
+            shown, where = self.at(parameter=varies.centre), ", the largest at ends and middle"
+        radius = max(spectral_radius(each.dynamics) for each in self.over_range)
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         lines.append(f"  stability     spectral radius {radius:.6f}{where} ({verdict})")
         if clipped := self.training.clipped:
@@ -623,7 +622,7 @@ class HankelDMDcModel(Servable):
                 f"    {counted(len(clipped), 'eigenvalue')} clipped to {self.settings.radius:g}; "
                 f"the largest was {clipped[0]:.6f}"
             )
-        table = over[-1].modes()
+        table = shown.modes()
         for mode in range(min(5, table.sizes["mode"])):
             at = table.isel(mode=mode)
             lines.append(
@@ -635,6 +634,11 @@ class HankelDMDcModel(Servable):
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
         return store.packed(replace(self, learnt=self.errors))
+
+
+def spectral_radius(dynamics: Dynamics) -> float:
+    """Largest modulus of an eigenvalue of Â."""
+    return float(np.abs(np.linalg.eigvals(dynamics.system)).max())
 
 
 def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:

@@ -39,9 +39,9 @@ from seakeep.executor import in_order
 from seakeep.models import labelled
 from seakeep.models.candidates import Candidates, Columns, Step, alignments_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
-from seakeep.models.ensemble import spectral_radius
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Given
+from seakeep.models.labelled import TrainingRuns
+from seakeep.models.linear import spectral_radius
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
@@ -397,7 +397,7 @@ class Problem:
 
 def _problem(
     widest: HankelSettings,
-    given: Given,
+    given: TrainingRuns,
     folds: Mapping[str, str] | int,
     horizons: tuple[int, ...],
 ) -> Problem | None:
@@ -450,7 +450,7 @@ def _problems(
     return problems
 
 
-def _lacking(settings: HankelSettings, given: Given) -> str:
+def _lacking(settings: HankelSettings, given: TrainingRuns) -> str:
     """What an optional alignment goes without, in words."""
     aligned = settings.alignment
     return aligned.missing(*given) if aligned is not None and aligned.optional else ""
@@ -649,14 +649,14 @@ class Selected(Generic[Chosen]):
         return "\n".join(lines)
 
 
-def settle(settings: Settings, given: Given, **how: Any) -> Selected[Settings]:
+def settle(settings: Settings, given: TrainingRuns, **how: Any) -> Selected[Settings]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
     settings : HankelSettings
         What was asked for; its ``select`` says what is chosen beside λ, and how.
-    given : Given
+    given : TrainingRuns
         Training runs and channels.
     **how
         Its ``kinds``, ``executor`` and ``progress``.
@@ -767,7 +767,7 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
-    given = Given(runs, states, inputs)
+    given = TrainingRuns(runs, states, inputs)
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
     _check_asked(settings, vary)
@@ -986,7 +986,7 @@ def _learnt(
     candidate: HankelSettings,
     level: float,
     steps: int,
-    given: Given,
+    given: TrainingRuns,
 ) -> tuple[FittedReadOut, ...]:
     """Fit read-outs to runs, and to forecasts of what is held out, if anything can be."""
     if not readouts:
@@ -998,14 +998,14 @@ def _learnt(
     return fit_readouts(readouts, gather(given, settings), given.runs, ())
 
 
-def readouts_for(settings: HankelSettings, given: Given) -> tuple[FittedReadOut, ...]:
+def readouts_for(settings: HankelSettings, given: TrainingRuns) -> tuple[FittedReadOut, ...]:
     """Fit the read-outs of settings that leave nothing else to be chosen.
 
     Parameters
     ----------
     settings : HankelSettings
         Delays, λ and input maps as stated.
-    given : Given
+    given : TrainingRuns
         Training runs and channels.
 
     Returns

@@ -32,7 +32,7 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean, quiet, warn
 from seakeep.models import labelled, store
 from seakeep.models.alignment import BACK, Following, ProbeAlignment
 from seakeep.models.inputs import InputMap
-from seakeep.models.labelled import Given
+from seakeep.models.labelled import TrainingRuns
 from seakeep.models.observables import NOTHING, Observed, observables_of
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.models.terms import Observable
@@ -663,7 +663,7 @@ class HankelSettings:
             return None
         return STABLE_RADIUS if self.stable is True else float(self.stable)
 
-    def input_map(self, given: Given, window: int | None) -> InputMap:
+    def input_map(self, given: TrainingRuns, window: int | None) -> InputMap:
         """Fit the input map to training runs that end where training ends.
 
         Observables of a model that follows its own surge are made of waves without look-ahead.
@@ -705,7 +705,12 @@ class HankelSettings:
         maps = InputMap(lead=self.lead, observed=observed, reference=self.centre)
         return Needs(
             self.window or 1,
-            max(self.state_reach, maps.history(delayed)),
+            # The carriers of a model that follows its surge read ahead in place of the map.
+            max(
+                self.state_reach,
+                maps.history(delayed),
+                (delayed + self.centre) * self.follows_surge,
+            ),
             self.history == "inside",
             maps.around.ahead,
         )

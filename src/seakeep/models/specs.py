@@ -34,12 +34,11 @@ from seakeep.models.ensemble import (
     TrainOn,
     draw_members,
     draws_of,
-    spectral_radius,
 )
 from seakeep.models.forecasts import Spec
 from seakeep.models.inputs import Signature
-from seakeep.models.labelled import Given, Runs, Stop, as_runs
-from seakeep.models.linear import HankelDMDcModel, regress_varying
+from seakeep.models.labelled import Runs, Stop, TrainingRuns, as_runs
+from seakeep.models.linear import HankelDMDcModel, regress_varying, spectral_radius
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
     FreeRuns,
@@ -107,11 +106,11 @@ class Choosing(HankelSettings, Generic[Fitted]):
         """These settings with what was chosen for :meth:`central`."""
         raise NotImplementedError
 
-    def variants(self, given: Given, *settings: Self) -> list[tuple[Self, str]]:
+    def variants(self, given: TrainingRuns, *settings: Self) -> list[tuple[Self, str]]:
         """Settings to fit until a model does not grow, each with words on its choice."""
         return [(each, "") for each in settings]
 
-    def _fitted(self, given: Given, readouts: tuple[FittedReadOut, ...]) -> Fitted:
+    def _fitted(self, given: TrainingRuns, readouts: tuple[FittedReadOut, ...]) -> Fitted:
         """What settings that leave nothing to be chosen give of runs cut where training ends."""
         raise NotImplementedError
 
@@ -146,7 +145,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
         RequestError, DataError
             As :meth:`fit`.
         """
-        given = Given.of(runs, states, inputs, stop)
+        given = TrainingRuns.of(runs, states, inputs, stop)
         spec = self.resolved_in(given.runs, given.inputs)
         choice = settle(
             spec.central(labelled.common_step(given.runs)),
@@ -202,7 +201,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
             first, or a constant channel while ``standardize`` is set; if the model that was chosen
             grows.
         """
-        given = Given.of(runs, states, inputs, stop)
+        given = TrainingRuns.of(runs, states, inputs, stop)
         spec = self.resolved_in(given.runs, given.inputs)
         if not self.is_open:
             readouts: tuple[FittedReadOut, ...] = ()
@@ -427,7 +426,7 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[HankelDMDc]:
         return replace(choice, settings=replace(choice.settings, select=None))
 
-    def variants(self, given: Given, *settings: HankelDMDc) -> list[tuple[HankelDMDc, str]]:
+    def variants(self, given: TrainingRuns, *settings: HankelDMDc) -> list[tuple[HankelDMDc, str]]:
         """As stated; with a parameter those that err 5 % less than the best pooled one, and that.
 
         With three values or more, all runs of an inner value are held out in turn; with two, the
@@ -471,7 +470,7 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
             for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
         ]
 
-    def _fitted(self, given: Given, readouts: tuple[FittedReadOut, ...]) -> HankelDMDcModel:
+    def _fitted(self, given: TrainingRuns, readouts: tuple[FittedReadOut, ...]) -> HankelDMDcModel:
         data, runs, variation = gather(given, self), given.runs, None
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
@@ -779,7 +778,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             return replace(self, train_on="all")
         return replace(self, train_on="windows", window=self.window or WINDOW)
 
-    def _fitted(self, given: Given, readouts: tuple[FittedReadOut, ...]) -> HankelEnsemble:
+    def _fitted(self, given: TrainingRuns, readouts: tuple[FittedReadOut, ...]) -> HankelEnsemble:
         runs, states, inputs = given
         dt = labelled.common_step(runs)
         shared = self.shared(dt)

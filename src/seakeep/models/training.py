@@ -23,7 +23,7 @@ from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, warn
 from seakeep.models import labelled
 from seakeep.models.inputs import InputMap, Regressors, Scale, Signature
-from seakeep.models.labelled import ChannelLabel, Given, Span
+from seakeep.models.labelled import ChannelLabel, Span, TrainingRuns
 from seakeep.models.settings import HankelSettings
 
 
@@ -181,13 +181,13 @@ def system_of(
 
 
 def gather(
-    given: Given, settings: HankelSettings, input_map: InputMap | None = None
+    given: TrainingRuns, settings: HankelSettings, input_map: InputMap | None = None
 ) -> TrainingData:
     """Fit the input map, and collect the training windows of the runs.
 
     Parameters
     ----------
-    given : Given
+    given : TrainingRuns
         Runs, at least one, and channels.
     settings : HankelSettings
         Input maps, delays, window and scaling.
@@ -348,7 +348,7 @@ class RunArrays:
     begin: float
 
     @classmethod
-    def read(cls, given: Given, name: str, first: int, input_map: InputMap) -> Self:
+    def read(cls, given: TrainingRuns, name: str, first: int, input_map: InputMap) -> Self:
         """Samples of a run from the first that a member reads on."""
         run = given.runs[name]
         time = run["time"].values.astype(float)
@@ -395,7 +395,7 @@ def member_data(
 
 
 def run_regressors(
-    input_map: InputMap, given: Given, name: str, span: Span, needed: int | None = None
+    input_map: InputMap, given: TrainingRuns, name: str, span: Span, needed: int | None = None
 ) -> Regressors:
     """Regressors of a training run; inputs as they are may have gaps before `needed`."""
     run, inputs = given.runs[name], given.inputs

@@ -32,7 +32,7 @@ leakage of a taper stays below it, and the tail of a sea above twice its peak fr
 FAR = 3.0
 """SDs of a training run that the mean of an input may lie beyond those of the runs."""
 STILL = 0.05
-"""Part of the trained height up to which an input is still: noise, whatever its periods."""
+"""Part of the trained height up to which an input other than waves is still: its noise alone."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
 
@@ -222,6 +222,11 @@ class Coverage:
         """Middle of each band, s, shape (band,)."""
         return 1.0 / np.sqrt(self.edges[:-1] * self.edges[1:])
 
+    @property
+    def is_wave(self) -> BoolArray:
+        """Inputs that are elevations, of which the steepness has a limit. Shape (channel,)."""
+        return np.isfinite(self.steepnesses)
+
     @cached_property
     def known(self) -> BoolArray:
         """Bands that were trained, and those beside: a taper leaks there. Shape (channel, band)."""
@@ -235,7 +240,7 @@ class Coverage:
         count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
         energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
         heights, steepnesses = np.max([_heights(each, dt) for each in series], axis=0)
-        steepnesses[[not is_elevation(each) for each in channels]] = np.inf
+        steepnesses[[not is_elevation(each) for each in channels]] = np.inf  # see is_wave
         shares = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
         means = np.stack([each.mean(axis=0) for each in series])
         # A constant is itself but for its rounding.
@@ -272,9 +277,9 @@ class Coverage:
         Of inputs that are not among `waves`, by their places, the mean alone is judged.
 
         The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
-        tenth, are no reason, nor are periods of what is still beside the training, as a rudder
-        amidships. Waves are judged from five periods on, means from two; none where a
-        model departs from the means of each run.
+        tenth, are no reason, nor are periods of an input other than waves that is still beside the
+        training, as a rudder amidships. Waves are judged from five periods on, means from two; none
+        where a model departs from the means of each run.
         """
         dt = signature.dt
         energy = band_energy(inputs, dt, self.first, self.shares.shape[1])
@@ -286,7 +291,7 @@ class Coverage:
         unseen = np.where(self.known, 0.0, own).sum(axis=1)
         reasons = np.array(
             [
-                (unseen > 0.5) & (heights > STILL * self.heights),
+                (unseen > 0.5) & (self.is_wave | (heights > STILL * self.heights)),
                 heights > margin * self.heights,
                 steepnesses > margin * self.steepnesses,
                 (means < self.lows) | (means > self.highs),

@@ -71,7 +71,7 @@ class SensorsKind(Kind):
         "speed dispersion does not hold: leave water_depth out of [rig].",
     )
     CELERITY = (
-        "correlates by only {value:.2f} with {other} at the lag of which the run's celerity is "
+        "correlates by only {value:.2f} with {other} at the lag that gives the run's celerity "
         "({celerity:.2f} m/s), which may be wrong"
     )
 

@@ -302,12 +302,7 @@ def read_tests(
         at, last = samples_in(run, used, span, model.dt, history, lead, first)
         begin = float(run["time"][at]) if first is None else first
         windows[label, name] = begin, count or max(last - at, 1)
-        try:
-            model.read_windows(run, [begin], windows[label, name][1])
-        except DataError as error:
-            others = " --run ".join(each for each in prepared if each != name)
-            mend = f" Or leave {name} out: --run {others}." if others else ""
-            raise DataError(f"{error}{mend}") from None
+        model.read_windows(run, [begin], windows[label, name][1])
     return prepared, windows
 
 
@@ -682,7 +677,7 @@ def calibration_parts(
         if stated is None:
             continue
         own = {name: instant_of(stated, campaign, run, option) for name, run in runs.items()}
-        edges[option], instant = own, next(iter(own.values()))
+        edges[option], instant = own, next(iter(own.values()), math.nan)
         inside = any(begin <= own[name] <= end for name, (begin, end) in spans.items())
         if not (inside or (option == "--stop" and instant == math.inf)):
             known = ", ".join(f"{name}: {span_text(*span, dt)}" for name, span in spans.items())

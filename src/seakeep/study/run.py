@@ -29,10 +29,9 @@ from seakeep.executor import WorkerLostError, as_finished, versions
 from seakeep.formats.columns import decoding
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
-from seakeep.models.ensemble import spectral_radius
 from seakeep.models.forecasts import STATISTICS, reduce_members
-from seakeep.models.labelled import Given, channel_matrix, nearest_sample
-from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.labelled import TrainingRuns, channel_matrix, nearest_sample
+from seakeep.models.linear import HankelDMDcModel, spectral_radius
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.training import gather, system_of
@@ -348,7 +347,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
         the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
     """
     spec = fitted.settings
-    given = Given(*plan.taught(plan.training[unit.training].spans))
+    given = TrainingRuns(*plan.taught(plan.training[unit.training].spans))
     data = gather(given, spec)
     system = system_of((data.states, data.delayed, data.direct), data.windows, spec)
     squares = np.linalg.eigvalsh(system.gram, UPLO="U")

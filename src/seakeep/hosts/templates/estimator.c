@@ -607,7 +607,8 @@ int {{ name }}_validity({{ name }}_estimator *e)
         if (!moves || !(total > 0.0) || !(repeats > {{ validity.CYCLES }}))
             continue;
         margin = 1.1 + 1.7 / sqrt(repeats);
-        if (unseen > 0.5 * total)
+        if (unseen > 0.5 * total
+                && (isfinite(steepnesses[q]) || height > {{ validity.STILL }} * heights[q]))
             outside |= {{ upper }}_PERIOD;
         if (height > margin * heights[q])
             outside |= {{ upper }}_HEIGHT;
