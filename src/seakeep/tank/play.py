@@ -355,13 +355,12 @@ HULL = ((-0.70, 0.20), (-0.62, -0.06), (-0.47, -0.083), (0.42, -0.083), (0.64, -
 """Outline of the CK-14e-like hull, m from the place at rest; any hull is drawn so."""
 
 
-def pixel_of(x: ArrayLike, z: ArrayLike) -> FloatArray:
+def pixel_of(x: float | FloatArray, z: float | FloatArray) -> FloatArray:
     """Pixels to the right and downwards from the first pixel's centre, of a point in the plane.
 
     `x` from the centre of gravity's at rest, `z` above still water, m.
     """
-    points = np.stack([np.asarray(x, float) - LEFT, TOP - np.asarray(z, float)], -1)
-    return points / METRES_PER_PIXEL
+    return np.stack([x - LEFT, TOP - z], -1) / METRES_PER_PIXEL
 
 
 def _turned(points: ArrayLike, centre: tuple[float, float], pitch: float) -> FloatArray:
@@ -471,10 +470,8 @@ def side_view(played: Played, rng: np.random.Generator, instants: ArrayLike) -> 
         yield np.clip(lit, 0, 255, out=lit).astype(np.uint8)
 
 
-def render_side_view(
-    played: Played, path: Path, rng: np.random.Generator, length: float | None = None
-) -> Path:
-    """Render a run, or its first `length` seconds by the video's clock, to an MP4 file.
+def render_side_view(played: Played, path: Path, rng: np.random.Generator) -> Path:
+    """Render a run to an MP4 file.
 
     Raises
     ------
@@ -485,7 +482,7 @@ def render_side_view(
     """
     cv2 = opencv("rendering")
     clock = played.settings.instruments.clocks["video"]
-    _, instants = clock_instants(clock, length or played.length)
+    _, instants = clock_instants(clock, played.length)
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         part = Path(folder) / "side_view.mp4"
         code = cv2.VideoWriter_fourcc(*"mp4v")
