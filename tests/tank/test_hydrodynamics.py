@@ -77,7 +77,7 @@ def test_damping_of_the_kernel_is_passive(hydro):
 
 def test_kernel_gives_the_damping_of_the_file_back(hydro):
     band = (hydro.omega >= 1.0) & (hydro.omega <= 8.0)  # the kernel's pool rows end above
-    _, found = kernel_coefficients(radiation_kernel(hydro), hydro.omega[band])
+    _, found = kernel_coefficients(radiation_kernel(hydro, 0.01, 12.0), hydro.omega[band])
     wanted = 0.5 * (hydro.damping + hydro.damping.swapaxes(1, 2))
     largest = np.sqrt(np.abs(np.diagonal(wanted, axis1=1, axis2=2)).max(axis=0))
     # 12 s of kernel lose less than 1 %; of slosh 3.3 % are not passive and taken away.

@@ -33,7 +33,6 @@ POOL_MODES = ("piston", "slosh")
 VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness", "far_field")
 TAIL_END = 40.0  # rad/s; the damping is continued as ω⁻³ from the last frequency to here
 POOL_TAPER = (9.0, 12.0)  # rad/s; above 12 rad/s the solver's pool rows are not clean
-KERNEL_LENGTH = 12.0  # s
 
 
 @dataclass(frozen=True)
@@ -157,9 +156,7 @@ def trapezoid(count: int, step: float) -> FloatArray:
     return weights
 
 
-def radiation_kernel(
-    hydro: Hydrodynamics, step: float = 0.01, length: float = KERNEL_LENGTH
-) -> Kernel:
+def radiation_kernel(hydro: Hydrodynamics, step: float, length: float) -> Kernel:
     r"""Radiation kernel :math:`K(t) = \frac{2}{\pi}\int B(\omega)\cos\omega t\,d\omega` and A∞.
 
     Step and length of the lags are in seconds; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
