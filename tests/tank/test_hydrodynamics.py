@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose
 from said import request_error
 
 from seakeep.tank.hydrodynamics import (
+    SHIPPED,
     excitation_at,
     kernel_coefficients,
     load_hydrodynamics,
     passive_damping,
     radiation_kernel,
-    shipped_hydrodynamics,
 )
 from seakeep.tank.settings import default_settings
 from seakeep.toml import validated
@@ -89,7 +89,7 @@ def test_kernel_gives_the_damping_of_the_file_back(hydro):
 
 def changed(tmp_path, change):
     path = tmp_path / "hull.nc"
-    data = xr.load_dataset(shipped_hydrodynamics(), engine="h5netcdf")
+    data = xr.load_dataset(SHIPPED, engine="h5netcdf")
     change(data).to_netcdf(path, engine="h5netcdf")
     return path
 

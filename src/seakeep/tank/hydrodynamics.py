@@ -31,6 +31,8 @@ CONVENTIONS = {
 RIGID = ("surge", "heave", "pitch")
 POOL_MODES = ("piston", "slosh")
 VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness", "far_field")
+SHIPPED = Path(__file__).with_name("data") / "ck14e.nc"
+"""The file of coefficients that ships with the package."""
 TAIL_END = 40.0  # rad/s; the damping is continued as ω⁻³ from the last frequency to here
 POOL_TAPER = (9.0, 12.0)  # rad/s; above 12 rad/s the solver's pool rows are not clean
 
@@ -66,11 +68,6 @@ class Kernel:
     infinite_mass: FloatArray
 
 
-def shipped_hydrodynamics() -> Path:
-    """Path of a file of coefficients that ships with the package."""
-    return Path(__file__).with_name("data") / "ck14e.nc"
-
-
 def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     """Read and check a file of coefficients, by default the one that ships with the package.
 
@@ -80,7 +77,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
         If the file does not exist, misses a variable, has values that are not finite, or was made
         under another convention.
     """
-    source = Path(path) if path else shipped_hydrodynamics()
+    source = Path(path or SHIPPED)
     try:
         with reading(source) as place:
             data = xr.load_dataset(place, engine="h5netcdf")
