@@ -140,8 +140,8 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
         values[f"eta_{probe}"] = played.elevation(at.position, time)
         if settings.instruments.second_order:
             values[f"eta_{probe}_crest"] = played.crest(at.position, time)
-    data = xr.Dataset(coords={"time": time})
-    data["time"].attrs = {"units": "s", "long_name": "time, reference clock"}
+    of_time = {"units": "s", "long_name": "time, reference clock"}
+    data = xr.Dataset(coords={"time": ("time", time, of_time)})
     for key, value in values.items():
         channel = canonical_channel(key)
         unit, words = (channel.units, channel.long_name) if channel else POOL_AND_DRIFT[key]
@@ -378,8 +378,7 @@ def _light() -> npt.NDArray[np.float32]:
     """Lighting that falls off from the upper right."""
     right = np.linspace(0.72, 1.06, WIDTH)[None, :, None]
     down = np.linspace(1.05, 0.90, HEIGHT)[:, None, None]
-    light = np.broadcast_to(right * down, (HEIGHT, WIDTH, 3))
-    return np.ascontiguousarray(light, dtype=np.float32)
+    return np.repeat(right * down, 3, axis=2).astype(np.float32)
 
 
 def frame_of(
@@ -398,7 +397,7 @@ def frame_of(
     centre = (surge, heave + centre_of_gravity)
     # The tank's wall: a vertical gradient with faint tiles.
     rows = np.linspace(105.0, 70.0, HEIGHT)[:, None, None] * np.array([1.0, 0.93, 0.82])
-    wall = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).copy()
+    wall = np.repeat(rows, WIDTH, axis=1)
     wall[::80] *= 0.88
     wall[:, ::80] *= 0.88
     frame = wall.astype(np.uint8)
@@ -419,7 +418,7 @@ def frame_of(
     begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
     end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
     if np.all(end > begin):
-        width, height = (int(n) for n in end - begin)
+        width, height = (end - begin).tolist()
         fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
         places = (points - begin + 0.5) * SUBPIXELS - 0.5
         cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
@@ -434,7 +433,7 @@ def frame_of(
     frame = cv2.addWeighted(water, 0.75, frame, 0.25, 0.0)
     level = int(40 + 190 * np.clip(lamp, 0.0, 1.0))
     cv2.circle(frame, (40, 40), 14, (level // 4, level // 2, level), -1, cv2.LINE_AA)
-    return np.asarray(frame, dtype=np.uint8)
+    return frame
 
 
 def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
