@@ -384,8 +384,9 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
         sound_matrix(run, [*study.states, *study.inputs], f"run '{name}'")
     shared, dt = next(iter(runs.values())).attrs, step_of(runs)
     # Prepared runs hold the period where their preparation counts in it.
-    period = general.encounter_period or shared.get("encounter_period")
-    period = period or campaign.encounter_period()
+    period = (
+        general.encounter_period or shared.get("encounter_period") or campaign.encounter_period()
+    )
     left_out = settings.training.scheme == "leave_out"
     models = {
         name: resolve_model(
