@@ -302,7 +302,7 @@ CELLS: dict[Form, Callable[..., str]] = {
 """Forms of cells that are no format of a number, as ``words.toml`` names them."""
 
 
-def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = 3) -> Number:
+def beside(*values: SupportsFloat, form: Form = 3) -> Number:
     """Text of a number, and of others that belong to it, such as bounds, in brackets.
 
     Examples
@@ -310,7 +310,7 @@ def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = 3) -> Numb
     >>> beside(0.481, 0.421, 0.549), beside(-20.4, -35.0, 5.0, form=signed)
     ('0.481 [0.421, 0.549]', '-20 [-35, +5]')
     """
-    first, *rest = (number(each, form) for each in (value, *others))
+    first, *rest = (number(each, form) for each in values)
     return Number(f"{first} [{', '.join(rest)}]")
 
 
