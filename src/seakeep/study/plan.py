@@ -54,11 +54,6 @@ class TrainingSet:
         """Whether a run may test what was learnt here."""
         return run not in self.like
 
-    @property
-    def runs(self) -> tuple[str, ...]:
-        """Names of the runs that train."""
-        return tuple(run for run, _, _ in self.spans)
-
 
 @dataclass(frozen=True)
 class TestWindow:

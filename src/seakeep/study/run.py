@@ -400,11 +400,11 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
     """
     training, statistics = plan.training[unit.training], plan.settings.statistics
     steps = next(iter(plan.tests.values()))[0].steps
-    if training.left_out or len(training.runs) > 1:
+    if training.left_out or len(training.spans) > 1:
         spec: Any = plan.specs[unit.model].from_json(fitted.origin)
         groups = [each.left_out for each in plan.training if each is not training and each.left_out]
         cases: dict[str, Any] = {}
-        for group in groups or [(run,) for run in training.runs]:
+        for group in groups or [(run,) for run, *_ in training.spans]:
             rest = [span for span in training.spans if span[0] not in group]
             tests = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
             if rest and tests:
