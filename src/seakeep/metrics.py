@@ -78,14 +78,10 @@ def paired(
 ) -> Pair:
     """Check two histories, and say which channels are judged."""
     p, m = as_real(predicted, "predicted"), as_real(measured, "measured")
-    if m.ndim == 1 and p.ndim >= 1 and p.shape[-1:] == m.shape:
+    if m.ndim == 1 and p.shape[-1:] == m.shape:
         p, m = p[..., None], m[:, None]
-    if m.ndim < 2 or p.ndim < 2 or p.shape[-2:] != m.shape[-2:]:
-        hint = (
-            " One of them looks transposed."
-            if p.ndim == m.ndim == 2 and p.shape == m.shape[::-1]
-            else ""
-        )
+    if m.ndim < 2 or p.shape[-2:] != m.shape[-2:]:
+        hint = " One of them looks transposed." if m.ndim == 2 and p.shape == m.shape[::-1] else ""
         raise RequestError(
             f"predicted has shape {p.shape} and measured {m.shape}; both must end in "
             f"(time, channel) of the same size.{hint}"

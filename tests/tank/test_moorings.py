@@ -34,7 +34,7 @@ def test_a_line_damps_the_rate_of_its_length(rig):
 
 def test_stiffness_is_the_slope_of_the_forces(rig):
     def force(q):
-        return np.sum([line_tension(line, *q, np.zeros(3))[1:] for line in rig.lines], axis=0)
+        return np.sum([line_tension(line, q, np.zeros(3))[1:] for line in rig.lines], axis=0)
 
     step = 1e-6
     slopes = [(force(step * e) - force(-step * e)) / (2 * step) for e in np.eye(3)]

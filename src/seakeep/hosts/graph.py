@@ -1,5 +1,6 @@
 """ONNX graphs of a model: one step, or a forecast of a fixed number of steps."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -110,14 +111,15 @@ class _Graph:
         return _Array(self, output)
 
 
+@dataclass(eq=False)  # equality is numpy's
 class _Array(NDArrayOperatorsMixin):
     """A value of a graph, to which the arithmetic of numpy adds nodes.
 
     What a model computes in Python, it writes so itself.
     """
 
-    def __init__(self, graph: _Graph, name: str) -> None:
-        self.graph, self.name = graph, name
+    graph: _Graph
+    name: str
 
     def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any) -> _Value:
         values = [each if isinstance(each, _Array) else np.asarray(each, float) for each in inputs]

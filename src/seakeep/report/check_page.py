@@ -197,13 +197,14 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
-    values = result[[*keys]].to_array().transpose("state", ...).values
+    chosen = result[[*keys]]
+    values = chosen.to_array().transpose("state", ...).values
     factors, units = zip(*map(prefixed, result["units"].values, values), strict=True)
     names = [
         f"{state} [{shown_unit(unit)}]"
         for state, unit in zip(result["state"].values, units, strict=True)
     ]
-    scaled = result[[*keys]] * xr.DataArray([*factors], dims="state")
+    scaled = chosen * xr.DataArray([*factors], dims="state")
     return result.assign(scaled).assign_coords(shown=("state", names))
 
 

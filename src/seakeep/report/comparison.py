@@ -55,10 +55,14 @@ def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
             if key in at
         ]
         yield _by_channel(at, "comparison", title, columns, _note(at))
-        bounds = []
-        for key, mean in (("nrmse", "anrmse"), ("nammae", "mean_nammae")):
-            each = (interval(one, key) for one in entries(at, "channel"))
-            bounds.append([f"{key.upper()}, 95 %", *each, interval(at, mean)])
+        bounds = [
+            [
+                f"{key.upper()}, 95 %",
+                *(interval(one, key) for one in entries(at, "channel")),
+                interval(at, mean),
+            ]
+            for key, mean in (("nrmse", "anrmse"), ("nammae", "mean_nammae"))
+        ]
         yield _by_channel(at, "intervals", "intervals over blocks of the forecast", bounds)
         yield _extremes(at, "extremes")
 
@@ -79,10 +83,10 @@ def _by_channel(
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
-    columns = [["unit", *map(str, at["channel_units"].values)]]
-    for key, head in WORDS["extremes"].items():
-        if key in at:
-            columns.append([head, *map(short, at[key])])
+    columns = [
+        ["unit", *map(str, at["channel_units"].values)],
+        *([head, *map(short, at[key])] for key, head in WORDS["extremes"].items() if key in at),
+    ]
     return _by_channel(at, "extremes", f"{title}{_scale_words(at)}", columns)
 
 

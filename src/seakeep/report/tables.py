@@ -19,7 +19,6 @@ from seakeep.report.style import model_words
 from seakeep.toml import packaged
 
 if TYPE_CHECKING:
-    from rich.console import JustifyMethod
     from rich.table import Table as RichTable
 
 
@@ -303,7 +302,7 @@ CELLS: dict[Form, Callable[..., str]] = {
 """Forms of cells that are no format of a number, as ``words.toml`` names them."""
 
 
-def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = 3) -> Number:
+def beside(*values: SupportsFloat, form: Form = 3) -> Number:
     """Text of a number, and of others that belong to it, such as bounds, in brackets.
 
     Examples
@@ -311,7 +310,7 @@ def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = 3) -> Numb
     >>> beside(0.481, 0.421, 0.549), beside(-20.4, -35.0, 5.0, form=signed)
     ('0.481 [0.421, 0.549]', '-20 [-35, +5]')
     """
-    first, *rest = (number(each, form) for each in (value, *others))
+    first, *rest = (number(each, form) for each in values)
     return Number(f"{first} [{', '.join(rest)}]")
 
 
@@ -465,7 +464,7 @@ def write_frame(frame: pd.DataFrame, path: Path) -> Path:
     return path
 
 
-def rich_tables(table: Table, width: int) -> list[RichTable]:
+def rich_tables(table: Table, width: int) -> Iterator[RichTable]:
     """Body of a table for a terminal of `width` characters.
 
     Text wraps between words, numbers are never cut: columns that do not fit stand in further
@@ -486,19 +485,21 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
         if len(blocks[-1]) > first and room([*blocks[-1], k]) < 0:
             blocks.append([*range(first)])
         blocks[-1].append(k)
-    out = []
     for block in blocks:
         left, each = max(room(block), 0), RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for k in block:
             more = min(left, max(map(len, columns[k])) - least[k])
             left -= more
-            side: JustifyMethod = "right" if k in table.numbers else "left"
-            each.add_column(columns[k][0], justify=side, width=least[k] + more, overflow="fold")
+            each.add_column(
+                columns[k][0],
+                justify="right" if k in table.numbers else "left",
+                width=least[k] + more,
+                overflow="fold",
+            )
         for number, row in enumerate(table.rows):
             bold = "bold" if number in table.averages else None
             each.add_row(*(row[k] for k in block), style=bold)
-        out.append(each)
-    return out
+        yield each
 
 
 def _least_width(column: Sequence[str], whole: bool) -> int:

@@ -54,11 +54,6 @@ class TrainingSet:
         """Whether a run may test what was learnt here."""
         return run not in self.like
 
-    @property
-    def runs(self) -> tuple[str, ...]:
-        """Names of the runs that train."""
-        return tuple(run for run, _, _ in self.spans)
-
 
 @dataclass(frozen=True)
 class TestWindow:
@@ -384,8 +379,9 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
         sound_matrix(run, [*study.states, *study.inputs], f"run '{name}'")
     shared, dt = next(iter(runs.values())).attrs, step_of(runs)
     # Prepared runs hold the period where their preparation counts in it.
-    period = general.encounter_period or shared.get("encounter_period")
-    period = period or campaign.encounter_period()
+    period = (
+        general.encounter_period or shared.get("encounter_period") or campaign.encounter_period()
+    )
     left_out = settings.training.scheme == "leave_out"
     models = {
         name: resolve_model(

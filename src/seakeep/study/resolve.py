@@ -51,8 +51,11 @@ class ResolvedModel:
 
 def _defaults(kind: Any) -> dict[str, Any]:
     """Keys that a kind of model has, and their defaults."""
-    settable = [each for each in fields(kind) if each.init]
-    return {each.name: each.default for each in settable if each.name not in OF_THE_DATA}
+    return {
+        each.name: each.default
+        for each in fields(kind)
+        if each.init and each.name not in OF_THE_DATA
+    }
 
 
 def _values(spec: Spec) -> dict[str, Any]:
@@ -187,8 +190,7 @@ def _check(settings: ModelSettings, preset: str | None, encounter_period: float 
 
 def _spec_of(kind: Any, start: Mapping[str, Any], given: dict[str, Any]) -> Spec:
     """The spec of what is given, and of what its preset or its kind starts from."""
-    settable = [each.name for each in fields(kind) if each.init]
-    start = {key: start[key] for key in settable}
+    start = {each.name: start[each.name] for each in fields(kind) if each.init}
     for name, table in TABLES.items():
         if isinstance(given.get(name), dict):
             check_keys(table, given[name], f"{name}: ")

@@ -399,11 +399,11 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
     """
     training, statistics = plan.training[unit.training], plan.settings.statistics
     steps = next(iter(plan.tests.values()))[0].steps
-    if training.left_out or len(training.runs) > 1:
+    if training.left_out or len(training.spans) > 1:
         spec: Any = plan.specs[unit.model].from_json(fitted.origin)
         groups = [each.left_out for each in plan.training if each is not training and each.left_out]
         cases: dict[str, Any] = {}
-        for group in groups or [(run,) for run in training.runs]:
+        for group in groups or [(run,) for run, *_ in training.spans]:
             rest = [span for span in training.spans if span[0] not in group]
             tests = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
             if rest and tests:
@@ -486,21 +486,24 @@ def facts_of(study: Study, plan: Plan) -> Groups:
             at = nearest_sample(plan.runs[each.run]["time"].values, each.start, each.run) + 1
             cut.append(known[each.run].isel(time=slice(at, at + each.steps)))
         judged = [[each.may_test(w.run) for w in windows] for each in plan.training]
-        out[test] = xr.concat(cut, "window", data_vars="all").assign(
-            judged=(("training", "window"), judged),
-            start=("window", [each.start for each in windows]),
-            training_mean=(("training", "channel"), [x.mean(axis=1) for x in pooled]),
-            training_std=(("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
-        )
-        out[test] = out[test].assign_coords(
-            model=list(plan.models),
-            ensemble=plan.ensembles,
-            measure=list(MEASURES),
-            band=list(BANDS),
-            training=[each.name for each in plan.training],
-            window=range(len(windows)),
-            time=("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
-            channel=list(plan.states),
+        out[test] = (
+            xr.concat(cut, "window", data_vars="all")
+            .assign(
+                judged=(("training", "window"), judged),
+                start=("window", [each.start for each in windows]),
+                training_mean=(("training", "channel"), [x.mean(axis=1) for x in pooled]),
+                training_std=(("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
+            )
+            .assign_coords(
+                model=list(plan.models),
+                ensemble=plan.ensembles,
+                measure=list(MEASURES),
+                band=list(BANDS),
+                training=[each.name for each in plan.training],
+                window=range(len(windows)),
+                time=("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
+                channel=list(plan.states),
+            )
         )
     return out
 

@@ -48,16 +48,16 @@ class Waves(NamedTuple):
 
 @_exact
 def line_tension(
-    line: FloatArray, surge: float, heave: float, pitch: float, velocity: FloatArray
+    line: FloatArray, position: FloatArray, velocity: FloatArray
 ) -> tuple[float, float, float, float]:
     """Tension of a line and its force on the vessel.
 
     `line` is a row of `dynamics.line_table`. Returns tension, force along x and z, moment about y.
     """
-    cosine, sine = math.cos(pitch), math.sin(pitch)
+    cosine, sine = math.cos(position[2]), math.sin(position[2])
     arm_x = line[0] * cosine + line[1] * sine
     arm_z = -line[0] * sine + line[1] * cosine
-    dx, dz = line[2] - surge - arm_x, line[3] - heave - arm_z
+    dx, dz = line[2] - position[0] - arm_x, line[3] - position[1] - arm_z
     length = math.sqrt(dx * dx + dz * dz)
     stretch = length - line[5]
     if stretch <= 0.0:
@@ -76,8 +76,7 @@ def line_tensions(lines: FloatArray, position: FloatArray, velocity: FloatArray)
     out = np.zeros((lines.shape[0], position.shape[1]))
     for i in range(lines.shape[0]):
         for j in range(position.shape[1]):
-            q = position[:, j]
-            out[i, j] = line_tension(lines[i], q[0], q[1], q[2], velocity[:, j])[0]
+            out[i, j] = line_tension(lines[i], position[:, j], velocity[:, j])[0]
     return out
 
 
@@ -144,7 +143,7 @@ def _body_forces(q: FloatArray, v: FloatArray, body: Body, force: FloatArray) ->
         force[1] += loss
         force[2] -= pool[0] * loss
     for i in range(body.lines.shape[0]):
-        _, fx, fz, moment = line_tension(body.lines[i], q[0], q[1], q[2], v)
+        _, fx, fz, moment = line_tension(body.lines[i], q, v)
         force[0] += fx
         force[1] += fz
         force[2] += moment

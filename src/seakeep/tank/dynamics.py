@@ -164,11 +164,9 @@ def line_table(
 def _check_step(rig: Rig) -> None:
     """Refuse a step beyond the stability of the integrator or the resolution of the kernel."""
     dofs = len(rig.names)
-    stiffness = rig.hydro.stiffness + rig.mooring_stiffness
-    system = np.zeros((2 * dofs, 2 * dofs))
-    system[:dofs, dofs:] = np.eye(dofs)
-    system[dofs:, :dofs] = -np.linalg.solve(rig.inertia, stiffness)
-    system[dofs:, dofs:] = -np.linalg.solve(rig.inertia, rig.linear_damping)
+    forces = np.hstack([rig.hydro.stiffness + rig.mooring_stiffness, rig.linear_damping])
+    # Velocity and acceleration by position and velocity.
+    system = np.vstack([np.eye(dofs, 2 * dofs, dofs), -np.linalg.solve(rig.inertia, forces)])
     fastest = np.max(np.abs(np.linalg.eigvals(system)))
     largest = min(STABLE / fastest, 2.0 / KERNEL_RATE)
     if rig.step > largest:

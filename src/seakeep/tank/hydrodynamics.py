@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import ArrayLike, ComplexArray, FloatArray
+from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading
 from seakeep.signals.calculus import rising
@@ -31,9 +31,10 @@ CONVENTIONS = {
 RIGID = ("surge", "heave", "pitch")
 POOL_MODES = ("piston", "slosh")
 VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness", "far_field")
+SHIPPED = Path(__file__).with_name("data") / "ck14e.nc"
+"""The file of coefficients that ships with the package."""
 TAIL_END = 40.0  # rad/s; the damping is continued as ω⁻³ from the last frequency to here
 POOL_TAPER = (9.0, 12.0)  # rad/s; above 12 rad/s the solver's pool rows are not clean
-KERNEL_LENGTH = 12.0  # s
 
 
 @dataclass(frozen=True)
@@ -67,11 +68,6 @@ class Kernel:
     infinite_mass: FloatArray
 
 
-def shipped_hydrodynamics() -> Path:
-    """Path of a file of coefficients that ships with the package."""
-    return Path(__file__).with_name("data") / "ck14e.nc"
-
-
 def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     """Read and check a file of coefficients, by default the one that ships with the package.
 
@@ -81,7 +77,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
         If the file does not exist, misses a variable, has values that are not finite, or was made
         under another convention.
     """
-    source = Path(path) if path else shipped_hydrodynamics()
+    source = Path(path or SHIPPED)
     try:
         with reading(source) as place:
             data = xr.load_dataset(place, engine="h5netcdf")
@@ -157,9 +153,7 @@ def trapezoid(count: int, step: float) -> FloatArray:
     return weights
 
 
-def radiation_kernel(
-    hydro: Hydrodynamics, step: float = 0.01, length: float = KERNEL_LENGTH
-) -> Kernel:
+def radiation_kernel(hydro: Hydrodynamics, step: float, length: float) -> Kernel:
     r"""Radiation kernel :math:`K(t) = \frac{2}{\pi}\int B(\omega)\cos\omega t\,d\omega` and A∞.
 
     Step and length of the lags are in seconds; A∞ by Ogilvie's relation, averaged over 2–9 rad/s.
@@ -178,31 +172,29 @@ def radiation_kernel(
     return Kernel(lags, values.reshape(-1, *hydro.mass.shape), infinite.mean(axis=0))
 
 
-def kernel_coefficients(kernel: Kernel, omega: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def kernel_coefficients(kernel: Kernel, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Added mass and damping that a kernel reproduces, each of shape (frequency, dof, dof)."""
-    frequencies = np.atleast_1d(np.asarray(omega, float))
     weights = trapezoid(kernel.lags.size, kernel.lags[1])
     flat = kernel.values.reshape(kernel.lags.size, -1) * weights[:, None]
-    phase = np.outer(frequencies, kernel.lags)
+    phase = np.outer(omega, kernel.lags)
     shape = (-1, *kernel.infinite_mass.shape)
-    added = kernel.infinite_mass - (np.sin(phase) @ flat / frequencies[:, None]).reshape(shape)
+    added = kernel.infinite_mass - (np.sin(phase) @ flat / omega[:, None]).reshape(shape)
     return added, (np.cos(phase) @ flat).reshape(shape)
 
 
-def _between(hydro: Hydrodynamics, values: ComplexArray, omega: ArrayLike) -> ComplexArray:
+def _between(hydro: Hydrodynamics, values: ComplexArray, omega: FloatArray) -> ComplexArray:
     """Values between the solver's frequencies, by cubic splines."""
-    wanted = np.atleast_1d(np.asarray(omega, float))
     low, high = hydro.omega[0], hydro.omega[-1]
-    if wanted.size and (wanted.min() < low or wanted.max() > high):
+    if omega.size and (omega.min() < low or omega.max() > high):
         raise RequestError(
-            f"frequencies from {wanted.min():g} to {wanted.max():g} rad/s leave the band of the "
+            f"frequencies from {omega.min():g} to {omega.max():g} rad/s leave the band of the "
             f"hydrodynamics file, {low:g} to {high:g} rad/s. Narrow the spectrum, or build a file "
             "with more frequencies."
         )
-    return scipy.interpolate.CubicSpline(hydro.omega, values, axis=0)(wanted)
+    return scipy.interpolate.CubicSpline(hydro.omega, values, axis=0)(omega)
 
 
-def excitation_at(hydro: Hydrodynamics, omega: ArrayLike) -> ComplexArray:
+def excitation_at(hydro: Hydrodynamics, omega: FloatArray) -> ComplexArray:
     """Wave excitation per metre of amplitude, shape (frequency, dof), by cubic splines.
 
     Raises RequestError if a frequency lies outside the file's band.
@@ -210,6 +202,6 @@ def excitation_at(hydro: Hydrodynamics, omega: ArrayLike) -> ComplexArray:
     return _between(hydro, hydro.excitation, omega)
 
 
-def far_field_at(hydro: Hydrodynamics, omega: ArrayLike) -> ComplexArray:
+def far_field_at(hydro: Hydrodynamics, omega: FloatArray) -> ComplexArray:
     """Forms of the outgoing waves between the solver's frequencies, by cubic splines."""
     return _between(hydro, hydro.far_field, omega)

@@ -13,7 +13,7 @@ import scipy
 import xarray as xr
 from numpy.random import Generator
 
-from seakeep.arrays import ArrayLike, BoolArray, FloatArray, Groups
+from seakeep.arrays import BoolArray, FloatArray, Groups
 from seakeep.signals.calculus import rising
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
@@ -54,9 +54,9 @@ class Played:
         """Part of their height to which the waves have grown, shape (time,)."""
         return rising((time - self.motion.time[0]) / self.rig.ramp)
 
-    def elevation(self, place: ArrayLike, time: FloatArray) -> FloatArray:
+    def elevation(self, place: float | FloatArray, time: FloatArray) -> FloatArray:
         """Linear elevation at a place in the tank (m from the wave maker), m."""
-        x = np.asarray(place, float) - self.settings.vessel.position
+        x = place - self.settings.vessel.position
         return self.ramp(time) * self.sea.elevation(x, time)
 
     def crest(self, place: float, time: FloatArray) -> FloatArray:
@@ -184,11 +184,6 @@ LOGGERS: dict[Logger, Callable[..., Columns]] = {
 """What each logger records of a run at instants, from a run, instants, rate and generator."""
 
 
-def _record(readings: FloatArray, columns: Columns) -> xr.Dataset:
-    channels = {name: ("time", values, {"units": unit}) for name, (unit, values) in columns.items()}
-    return xr.Dataset(channels, coords={"time": ("time", readings, {"units": "s"})})
-
-
 def record_run(played: Played, rng: Generator, single_rate: float | None = None) -> Groups:
     """Record a run with all instruments, each with its own noise.
 
@@ -209,7 +204,6 @@ def record_run(played: Played, rng: Generator, single_rate: float | None = None)
     """
     instruments = played.settings.instruments
     records: Groups = {}
-    together: Columns = {}
     for (name, make), child in zip(LOGGERS.items(), rng.spawn(len(LOGGERS)), strict=True):
         clock = ClockSettings(rate=single_rate) if single_rate else instruments.clocks[name]
         readings, instants = clock_instants(clock, played.length)
@@ -222,6 +216,8 @@ def record_run(played: Played, rng: Generator, single_rate: float | None = None)
             else:
                 columns["trigger"] = "V", TRIGGER_VOLTS * pulse + TRIGGER_NOISE * noise
         columns |= make(played, instants, clock.rate, child)
-        records[name] = _record(readings, columns)
-        together |= columns
-    return {"all": _record(readings, together)} if single_rate else records
+        records[name] = xr.Dataset(
+            {key: ("time", values, {"units": unit}) for key, (unit, values) in columns.items()},
+            {"time": ("time", readings, {"units": "s"})},
+        )
+    return {"all": xr.merge(records.values())} if single_rate else records

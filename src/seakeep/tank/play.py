@@ -140,8 +140,8 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
         values[f"eta_{probe}"] = played.elevation(at.position, time)
         if settings.instruments.second_order:
             values[f"eta_{probe}_crest"] = played.crest(at.position, time)
-    data = xr.Dataset(coords={"time": time})
-    data["time"].attrs = {"units": "s", "long_name": "time, reference clock"}
+    of_time = {"units": "s", "long_name": "time, reference clock"}
+    data = xr.Dataset(coords={"time": ("time", time, of_time)})
     for key, value in values.items():
         channel = canonical_channel(key)
         unit, words = (channel.units, channel.long_name) if channel else POOL_AND_DRIFT[key]
@@ -355,13 +355,12 @@ HULL = ((-0.70, 0.20), (-0.62, -0.06), (-0.47, -0.083), (0.42, -0.083), (0.64, -
 """Outline of the CK-14e-like hull, m from the place at rest; any hull is drawn so."""
 
 
-def pixel_of(x: ArrayLike, z: ArrayLike) -> FloatArray:
+def pixel_of(x: float | FloatArray, z: float | FloatArray) -> FloatArray:
     """Pixels to the right and downwards from the first pixel's centre, of a point in the plane.
 
     `x` from the centre of gravity's at rest, `z` above still water, m.
     """
-    points = np.stack([np.asarray(x, float) - LEFT, TOP - np.asarray(z, float)], -1)
-    return points / METRES_PER_PIXEL
+    return np.stack([x - LEFT, TOP - z], -1) / METRES_PER_PIXEL
 
 
 def _turned(points: ArrayLike, centre: tuple[float, float], pitch: float) -> FloatArray:
@@ -379,8 +378,7 @@ def _light() -> npt.NDArray[np.float32]:
     """Lighting that falls off from the upper right."""
     right = np.linspace(0.72, 1.06, WIDTH)[None, :, None]
     down = np.linspace(1.05, 0.90, HEIGHT)[:, None, None]
-    light = np.broadcast_to(right * down, (HEIGHT, WIDTH, 3))
-    return np.ascontiguousarray(light, dtype=np.float32)
+    return np.repeat(right * down, 3, axis=2).astype(np.float32)
 
 
 def frame_of(
@@ -399,7 +397,7 @@ def frame_of(
     centre = (surge, heave + centre_of_gravity)
     # The tank's wall: a vertical gradient with faint tiles.
     rows = np.linspace(105.0, 70.0, HEIGHT)[:, None, None] * np.array([1.0, 0.93, 0.82])
-    wall = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).copy()
+    wall = np.repeat(rows, WIDTH, axis=1)
     wall[::80] *= 0.88
     wall[:, ::80] *= 0.88
     frame = wall.astype(np.uint8)
@@ -420,7 +418,7 @@ def frame_of(
     begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
     end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
     if np.all(end > begin):
-        width, height = (int(n) for n in end - begin)
+        width, height = (end - begin).tolist()
         fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
         places = (points - begin + 0.5) * SUBPIXELS - 0.5
         cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
@@ -435,7 +433,7 @@ def frame_of(
     frame = cv2.addWeighted(water, 0.75, frame, 0.25, 0.0)
     level = int(40 + 190 * np.clip(lamp, 0.0, 1.0))
     cv2.circle(frame, (40, 40), 14, (level // 4, level // 2, level), -1, cv2.LINE_AA)
-    return np.asarray(frame, dtype=np.uint8)
+    return frame
 
 
 def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
@@ -471,10 +469,8 @@ def side_view(played: Played, rng: np.random.Generator, instants: ArrayLike) -> 
         yield np.clip(lit, 0, 255, out=lit).astype(np.uint8)
 
 
-def render_side_view(
-    played: Played, path: Path, rng: np.random.Generator, length: float | None = None
-) -> Path:
-    """Render a run, or its first `length` seconds by the video's clock, to an MP4 file.
+def render_side_view(played: Played, path: Path, rng: np.random.Generator) -> Path:
+    """Render a run to an MP4 file.
 
     Raises
     ------
@@ -485,7 +481,7 @@ def render_side_view(
     """
     cv2 = opencv("rendering")
     clock = played.settings.instruments.clocks["video"]
-    _, instants = clock_instants(clock, length or played.length)
+    _, instants = clock_instants(clock, played.length)
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         part = Path(folder) / "side_view.mp4"
         code = cv2.VideoWriter_fourcc(*"mp4v")

@@ -31,7 +31,7 @@ class Sea:
 
         Places (m) are broadcast against instants (s).
         """
-        place, t = np.broadcast_arrays(np.asarray(x, float), np.asarray(time, float))
+        place, t = np.broadcast_arrays(x, time)
         if np.ndim(x) == 0 and t.ndim == 1 and t.size > BLOCK:
             steps = np.diff(t)
             if np.ptp(steps) < 1e-9 * abs(steps[0]) + 1e-11:
@@ -66,7 +66,7 @@ class Sea:
         return self.wavenumber[middle]
 
 
-def pierson_moskowitz(frequency: ArrayLike, height: float, peak_period: float) -> FloatArray:
+def pierson_moskowitz(frequency: FloatArray, height: float, peak_period: float) -> FloatArray:
     """Pierson–Moskowitz spectrum (m²/Hz; equation eq:pm of the paper) at frequencies in Hz.
 
     Examples
@@ -75,13 +75,12 @@ def pierson_moskowitz(frequency: ArrayLike, height: float, peak_period: float) -
     >>> round(float(4 * np.sqrt(np.sum(pierson_moskowitz(f, 0.15, 2.12)) * 0.001)), 4)
     0.15
     """
-    f = np.asarray(frequency, float)
-    relative = (peak_period * f) ** -4.0
-    return 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
+    relative = (peak_period * frequency) ** -4.0
+    return 5 / 16 * height**2 * relative / frequency * np.exp(-1.25 * relative)
 
 
 def jonswap(
-    frequency: ArrayLike, height: float, peak_period: float, peak_enhancement: float = 3.3
+    frequency: FloatArray, height: float, peak_period: float, peak_enhancement: float = 3.3
 ) -> FloatArray:
     """JONSWAP spectrum (m²/Hz), normalised so that its significant height is `height`.
 
@@ -96,17 +95,16 @@ def jonswap(
 
     grid = np.geomspace(0.1, 40.0, 8001) / peak_period
     variance = np.trapezoid(shape(grid), grid)
-    return shape(np.asarray(frequency, float)) * (height**2 / 16 / variance)
+    return shape(frequency) * (height**2 / 16 / variance)
 
 
-def spectral_density(settings: SpectrumSettings, frequency: ArrayLike) -> FloatArray:
+def spectral_density(settings: SpectrumSettings, frequency: FloatArray) -> FloatArray:
     """Density of a spectrum that settings describe, m²/Hz at frequencies in Hz.
 
     A table is interpolated linearly and is zero outside its span.
     """
     if settings.kind == "table":
-        f = np.asarray(frequency, float)
-        return np.interp(f, settings.frequencies, settings.densities, left=0.0, right=0.0)
+        return np.interp(frequency, settings.frequencies, settings.densities, left=0.0, right=0.0)
     height, period = settings.height or 0.0, settings.peak_period or 0.0
     if settings.kind == "jonswap":
         return jonswap(frequency, height, period, settings.peak_enhancement)

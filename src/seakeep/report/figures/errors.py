@@ -309,21 +309,13 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     for axes, name in zip(places, names, strict=True):
         for number, (model, of_model) in enumerate(nowcasts.items()):
             at, style = of_model.sel(run=run, channel=name), SERIES[1 + number % (len(SERIES) - 1)]
-            axes.plot(
-                at["lead"],
-                at["error"],
-                color=style["color"],
-                linestyle=style["linestyle"] if number else "-",
-                label=plain_text(f"{model}: error"),
-            )
-            axes.plot(
-                at["lead"],
-                at["claimed"],
-                color=style["color"],
-                linewidth=0.7,
-                alpha=0.7,
-                label=plain_text(f"{model}: claimed"),
-            )
+            lines: dict[str, dict[str, Any]] = {
+                "error": {"linestyle": style["linestyle"] if number else "-"},
+                "claimed": {"linewidth": 0.7, "alpha": 0.7},
+            }
+            for key, line in lines.items():
+                label = plain_text(f"{model}: {key}")
+                axes.plot(at["lead"], at[key], color=style["color"], label=label, **line)
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
         axes.set_title(short_label(name))
         axes.set(xlim=(0, first["lead"].max()), xlabel="lead time [s]")

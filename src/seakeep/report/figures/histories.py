@@ -487,10 +487,9 @@ def spectrum_figure(result: StudyResult) -> Figure:
     spectra, runs = result.groups["spectra"], result.groups["runs"]
     figure = new_figure(8.5, 4.2)
     axes = figure.subplots()
-    known = result.groups.get("nominal", xr.Dataset())
     nominal = [
-        (each.attrs["long_name"], (known["frequency"].values, each.values))
-        for each in known.data_vars.values()
+        (each.attrs["long_name"], (each["frequency"].values, each.values))
+        for each in result.groups.get("nominal", xr.Dataset()).values()
     ]
     # Where no run is irregular the mean over all of them is drawn.
     drawn = runs["run"][runs["waves"] != "regular"]

@@ -17,7 +17,7 @@ from seakeep.report.style import listed, model_words, shown_unit
 from seakeep.report.tables import WORDS, Table, entries, number, percent, reach, row, table
 from seakeep.study import StudyResult
 from seakeep.study.judge import window_spans
-from seakeep.study.plan import windows_overlap
+from seakeep.study.plan import Span, windows_overlap
 from seakeep.waves import phase_speed
 
 
@@ -191,10 +191,7 @@ def _data_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
     yield "filter before resampling", " and ".join(filters) or "none"
 
 
-Spans = list[tuple[str, float, float]]
-
-
-def training_spans(result: StudyResult) -> list[Spans]:
+def training_spans(result: StudyResult) -> list[list[Span]]:
     """Run, start and end (s) of each span of each training set."""
     training = result.groups["training"]
     runs = training["of_run"].values
