@@ -60,7 +60,7 @@ def _repeats(plan: Plan) -> xr.Dataset | None:
 
 def words_of_repeats(repeats: xr.Dataset) -> str:
     """Say which test runs repeat training input, the one that repeats most in full."""
-    worst = repeats.isel(run=repeats["share"].argmax())
+    worst = repeats.isel(run=int(np.argmax(repeats["share"].values)))
     others = [str(run) for run in repeats["run"].values if run != worst["run"]]
     more = f" So does that of {', '.join(others)}." if others else ""
     words = str(worst["words"].values)
