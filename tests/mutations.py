@@ -40,7 +40,7 @@ CHANGES = {
     "campaign/guesses.py": [
         ("< step / usual < 2000", "< usual / step < 2000", "campaign/test_drafts.py::test_one_file_in_milliseconds_is_drafted_as_such"),
         ("one.run == other.run if one.is_like(other)", "False if one.is_like(other)", "campaign/test_drafts.py::test_files_that_fit_no_run_or_logger_are_named"),
-        ('startswith("heave") and "down" in', 'False and "down" in', "campaign/test_drafts.py::test_a_draft_of_measurements_at_sea"),
+        ('self.channel.startswith("heave") and "down" in', 'False and "down" in', "campaign/test_drafts.py::test_a_draft_of_measurements_at_sea"),
         ("guess.is_motion or is_elevation(guess.channel)", "guess.is_motion", "campaign/test_drafts.py::test_a_dead_probe_shows_no_waves_and_drives_nothing"),
         ("np.diff(past_midnight(series))", "np.diff(series)", "campaign/test_drafts.py::test_a_draft_tells_days_and_midnights"),
         ("step < SERIAL", "step < 0", "campaign/test_drafts.py::test_a_draft_tells_days_and_midnights"),
