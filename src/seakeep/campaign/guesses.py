@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -119,8 +120,7 @@ class File:
 class Guess:
     """A guess for a column; `channel` is empty where nothing fits, and `why` says so.
 
-    `unit_from` says who states the unit: "files" (all), "some" of them, "name" (its end), "nobody".
-    `gaps` are "short" or "long".
+    `unit_from` says who states the unit: all files, some, the end of the column's name, or nobody.
     `at_rest` says that the motion or the wave does not show beside others, `behind` that a probe's
     name places it behind the vessel.
     """
@@ -128,11 +128,11 @@ class Guess:
     column: str
     header: str
     unit: str
-    unit_from: str
+    unit_from: Literal["files", "some", "name", "nobody"]
     channel: str = ""
     logger: str = ""
     why: str = ""
-    gaps: str = ""
+    gaps: Literal["", "short", "long"] = ""
     at_rest: bool = False
     behind: bool = False
 
@@ -382,7 +382,7 @@ def _guess(column: str, files: Files) -> Guess:
     if is_trigger(column):
         return Guess(column, header, "-", "nobody", why="pulses of a trigger")
     name, unit = column, next(iter(stated), None)
-    stated_by = "files"
+    stated_by: Literal["files", "some", "name", "nobody"] = "files"
     if unit is None:
         bare, named = named_unit(column)
         stated_by = "nobody"
@@ -406,7 +406,7 @@ def _printable(text: str) -> str:
     return re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", text)
 
 
-def _fault(column: str, files: Files) -> tuple[str, str]:
+def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]]:
     """Why a column cannot be a channel, if it cannot; and what gaps it has."""
     if why := files[0].table.faults.get(column):
         return why.removeprefix(f"{files[0].path}: "), ""

@@ -333,7 +333,7 @@ def compare_sensors(
     length = 4 * period if window is None else window
     if not 0 < gain < np.inf or x.size * dt < length + period:
         return nothing
-    stuck = np.broadcast_to(np.asarray(stuck_samples, bool), x.shape)  # none of None
+    stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
 
     def moving(length: float) -> tuple[Lags, list[slice]]:
         """Lags in windows with enough motion, and the samples of these."""
